@@ -20,12 +20,12 @@ Status run_align(const AlignCommand& command) {
     return {};
   }
   if (command.scan.empty()) {
-    fmt::print("pose from {} in {}\n", aligned.how, command.out.string());
+    fmt::print("pose from {}; files in {}\n", aligned.how, command.out.string());
     return {};
   }
   const auto stddev = [&](int i) { return std::sqrt(aligned.registration.covariance(i, i)); };
   fmt::print(
-      "{} of {} points fit within {:.3f} mm RMS; standard deviation {:.3f} mm, {:.4f} degrees; in {}\n",
+      "{} of {} points fit within {:.3f} mm RMS; standard deviation {:.3f} mm, {:.4f} degrees; files in {}\n",
       aligned.registration.used, aligned.registration.near, 1e3 * aligned.registration.rms_m,
       1e3 * std::max({stddev(3), stddev(4), stddev(5)}),
       180 / M_PI * std::max({stddev(0), stddev(1), stddev(2)}), command.out.string());

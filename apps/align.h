@@ -6,10 +6,10 @@
 namespace limn::apps {
 
 struct AlignCommand : AlignOptions {
-  bool json = false;  ///< print align.json instead of a line
+  bool json = false;  ///< Prints align.json instead of a line.
 };
 
-/// `limn align`: as written_alignment(), and prints what came of it.
+/// `limn align`: calls written_alignment() and prints the result.
 Status run_align(const AlignCommand& command);
 
 }  // namespace limn::apps

@@ -8,13 +8,13 @@
 namespace limn::apps {
 
 struct BenchOptions {
-  std::string name;                    ///< tracker, calib, projector, live, remote, tablet
-  std::vector<std::string> arguments;  ///< passed on
+  std::string name;                    ///< tracker, id, calib, solve, projector, live, remote or tablet
+  std::vector<std::string> arguments;  ///< Arguments for the bench.
 };
 
-/// Becomes the bench program NAME_bench that stands in tests/bench/ beside the running program. The benches
-/// are programs of their own because they link what they compare with (libapriltag, OpenCV's detector), which
-/// the product must not carry. Returns only when that fails.
+/// Replaces this process by the bench program NAME_bench in tests/bench/ beside the running program. The
+/// benches are separate programs because they link what they compare with (libapriltag, OpenCV's detector),
+/// which the product must not link. Returns only when that fails.
 Status run_bench(const BenchOptions& options);
 
 }  // namespace limn::apps

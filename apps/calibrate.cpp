@@ -79,11 +79,11 @@ void say_end(const CalibrateOptions& options, const Calibrated& done, const Say&
     times.push_back(fmt::format("{} {:.1f} s", projector, seconds));
   const auto taken = std::count_if(done.poses.begin(), done.poses.end(),
                                    [](const PoseJudged& judged) { return !judged.before; });
-  say(fmt::format("captured {} of {} poses in this run, at the cameras' pace: {}", taken, done.poses.size(),
-                  fmt::join(times, ", ")));
+  say(fmt::format("captured {} of {} poses in this run; capture time on the cameras' clock: {}", taken,
+                  done.poses.size(), fmt::join(times, ", ")));
   say(done.report.explanation.verdict);
   if (!done.no_prototype.empty())
-    say(fmt::format("the prototype was not scanned: {} The rig is saved; the same command tries again.",
+    say(fmt::format("the prototype was not scanned: {} The rig is saved; run the same command to try again.",
                     done.no_prototype));
   say(fmt::format("rig and report in {} ({:.0f} s)", options.out.string(), done.seconds));
 }
@@ -96,18 +96,18 @@ std::string devices_in_words(const calib::CaptureSet& captures, const char* wher
                      counted(captures.projectors.size(), "projector"));
 }
 
-// None where lines are wanted, or where there is no display.
+// Nullopt if lines are wanted or there is no display.
 std::optional<GuiWindow> window_for(const CalibrateOptions& options, const Result<device::Desktop>& desktop) {
   constexpr int k_width = 1600, k_height = 1000;
   if (options.terminal || options.json) return std::nullopt;
   auto window = desktop ? GuiWindow::open(*desktop, "Limn calibration", k_width, k_height)
                         : Result<GuiWindow>(desktop.error());
   if (window) return std::move(*window);
-  log_info("calibrate: {} The wizard goes on in the terminal.", window.message());
+  log_info("calibrate: {} The wizard continues in the terminal.", window.message());
   return std::nullopt;
 }
 
-// The wizard with its surroundings, in a window or in the terminal; prints the end.
+// Runs the wizard in a window or in the terminal, and prints the result.
 Status played(const CalibrateOptions& options,
               const std::string& plan_json,
               const WizardPlan& plan,
@@ -152,7 +152,7 @@ Status calibrate_virtually(const CalibrateOptions& asked) {
       virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish, &executor);
 }
 
-// A display of the main thread, for another one.
+// Lets another thread use a display of the main thread.
 class ErrandDisplay : public device::Display {
  public:
   ErrandDisplay(std::unique_ptr<device::Display> display, MainThreadExecutor* executor)
@@ -193,7 +193,8 @@ Status calibrate_on(const CalibrateOptions& options,
   const Imager assumed = assumed_camera(first.name, first.width, first.height);
   const std::vector<Pose> poses = guided_poses(assumed, *board);
   auto targets = outlines(*board, poses, {assumed});
-  for (auto& pose : targets) pose.resize(captures.cameras.size());  // nothing is known yet of the others
+  for (auto& pose : targets)
+    pose.resize(captures.cameras.size());  // the other cameras' poses are not known yet
   const auto targets_by = [&](const Rig& rig) {
     return outlines(*board, placed_alike(poses, *board, assumed, rig), rig.cameras);
   };

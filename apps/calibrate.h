@@ -10,24 +10,25 @@
 namespace limn::apps {
 
 struct CalibrateOptions {
-  std::filesystem::path plan = {};     ///< of a virtual rig
-  std::filesystem::path devices = {};  ///< limn.devices/1, instead of a plan
-  std::string board = {};              ///< with devices: `charuco:11x8:25mm`
-  std::string code = "gray";           ///< with devices
-  std::filesystem::path out;           ///< the rig folder; its captures/ keeps every image
-  std::filesystem::path scene = {};    ///< of the prototype; with a plan its world's
-  bool scan = false;                   ///< scan the prototype at the end, and paint it
-  bool all = false;                    ///< take every pose of the plan, although fewer are enough
-  bool terminal = false;               ///< lines instead of a window
-  bool json = false;  ///< print one JSON at the end; the lines go to stderr, there is no window
+  std::filesystem::path plan = {};     ///< Plan of a virtual rig (limn.plan/1).
+  std::filesystem::path devices = {};  ///< limn.devices/1, instead of a plan.
+  std::string board = {};              ///< With devices: `charuco:11x8:25mm`.
+  std::string code = "gray";           ///< With devices: gray, phase or xor.
+  std::filesystem::path out;           ///< Rig folder; its captures/ keeps every image.
+  std::filesystem::path scene =
+      {};             ///< Scene with the prototype's CAD mesh; with a plan the default is its world's scene.
+  bool scan = false;  ///< Scan the prototype at the end and project colours that show how far light is off.
+  bool all = false;   ///< Capture every pose of the plan, even if fewer are enough.
+  bool terminal = false;  ///< Lines in the terminal instead of a window.
+  bool json = false;      ///< Prints one JSON at the end; lines go to stderr, no window opens.
 };
 
-/// `limn calibrate`: on the virtual rig of the plan's world, or on devices; in a window where a display is
-/// there and neither `terminal` nor `json` is asked for.
+/// `limn calibrate`: on the virtual rig of the plan's world, or on devices. Runs in a window if there is a
+/// display and neither `terminal` nor `json` is set.
 Status run_calibrate(const CalibrateOptions& options);
 
-/// `limn calibrate` on devices that are open (of `options` devices is not read); in a window of `desktop`, as
-/// run_calibrate() does it. The displays are used by the calling thread alone.
+/// `limn calibrate` on devices that are already open (`options.devices` is not read), in a window of
+/// `desktop` under the same conditions as run_calibrate(). The displays are used by the calling thread alone.
 Status calibrate_on(const CalibrateOptions& options,
                     DeviceBackend::Devices devices,
                     const Result<device::Desktop>& desktop);

@@ -32,7 +32,7 @@ Result<std::vector<fs::path>> shipped_checks() {
   return files;
 }
 
-// All are read before any is judged: a broken file is told at once.
+// All checks are read before the first one runs, so that a broken file is reported at once.
 Result<std::vector<Check>> read_checks(const std::vector<fs::path>& files) {
   std::vector<Check> checks;
   std::map<std::string, std::string> known;
@@ -41,7 +41,8 @@ Result<std::vector<Check>> read_checks(const std::vector<fs::path>& files) {
     const auto [earlier, fresh] = known.emplace(check.name, file.string());
     if (!fresh) {
       return usage_error(
-          "{}: expected checks of different file names, for their pictures' folders, found {}, too.",
+          "{}: expected checks with different file names, because each name is a folder of images, found {} "
+          "as well. Rename one.",
           file.string(), earlier->second);
     }
     checks.push_back(std::move(check));
@@ -82,23 +83,25 @@ Status write_images(const CheckResult& result, const fs::path& out) {
   return {};
 }
 
-// Share of an image's pixels that are more than two levels from another run's.
+// Share of an image's pixels that differ by more than two levels from another run's image.
 Result<double> share_apart(const CheckImage& image, const fs::path& theirs) {
   constexpr double k_same_levels = 2;
   LIMN_TRY(const cv::Mat expected, read_image(theirs));
   if (expected.size() != image.actual.size() || expected.type() != image.actual.type())
-    return error("{}: expected a picture of {}x{} as here, found another kind of {}x{}. Run the same checks.",
-                 theirs.string(), image.actual.cols, image.actual.rows, expected.cols, expected.rows);
+    return error(
+        "{}: expected an image of {}x{} as in this run, found another kind of {}x{}. Run the same checks.",
+        theirs.string(), image.actual.cols, image.actual.rows, expected.cols, expected.rows);
   const int pixels = static_cast<int>(expected.total());
   cv::Mat apart, farthest;
   cv::absdiff(image.actual, expected, apart);
-  cv::reduce(apart.reshape(1, pixels), farthest, 1, cv::REDUCE_MAX);  // over channels
+  cv::reduce(apart.reshape(1, pixels), farthest, 1, cv::REDUCE_MAX);  // maximum over channels
   return cv::countNonZero(farthest > k_same_levels) / static_cast<double>(pixels);
 }
 
-// One reading more: the image that is farthest from what the run in `against` drew.
+// Adds one reading: the largest difference of an image from the run in `against`.
 void compare(const fs::path& against, CheckResult* result) {
-  static const CheckMeasure measure = {"apart_share", "pixels more than two levels from the other run's", ""};
+  static const CheckMeasure measure = {"apart_share",
+                                       "pixels that differ by more than two levels from the other run", ""};
   constexpr double k_most = 0.001;
   double worst = 0;
   for (const CheckImage& image : result->images) {

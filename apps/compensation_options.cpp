@@ -20,7 +20,7 @@ std::optional<Compensation> compensation_of(const std::string& word) {
   return std::nullopt;
 }
 
-// What the first camera that measured the surface under every projector saw.
+// The surface as the first camera that measured it under every projector saw it.
 Result<MeasuredSurface> load_surface(const fs::path& response_json,
                                      const Rig& rig,
                                      const Pose& world_from_prototype) {
@@ -38,8 +38,8 @@ Result<MeasuredSurface> load_surface(const fs::path& response_json,
     if (surface.mixings.size() == rig.projectors.size()) return surface;
   }
   return error(
-      "{} (No camera measured the surface under all projectors: limn patterns --response writes the "
-      "pictures to show, limn solve reads their photographs.)",
+      "{} (No camera measured the surface under all projectors: limn patterns --response writes the images "
+      "to show, limn solve reads their photographs.)",
       missing.empty() ? "--compensation measured: expected a camera in the rig, found none." : missing);
 }
 
@@ -71,8 +71,8 @@ Status set_light(const LightArguments& arguments,
   }
   if (!scene.prototype || !measured_at) {
     return error(
-        "--compensation measured: expected a prototype with its place when it was measured, found none. "
-        "Give --measured-at POSES.json with world_from_prototype.");
+        "--compensation measured: expected the prototype's pose when it was measured, found none. Give "
+        "--measured-at POSES.json with world_from_prototype.");
   }
   const fs::path folder = fs::is_directory(rig_path) ? rig_path : rig_path.parent_path();
   LIMN_TRY(const MeasuredSurface surface, load_surface(folder / "response.json", rig, *measured_at));

@@ -26,15 +26,15 @@ Status write_results(const fs::path& out, const DemoResult& result) {
   }
   LIMN_TRY_STATUS(write_file(out / "demo.json", result.json));
   const DemoPage page{
-      "A whole session on a virtual rig whose truth is known. Two projectors and a camera were calibrated "
-      "from "
-      "simulated captures, the markers were found in a simulated photograph, the parts were painted onto the "
-      "door, and a ray tracer that shares no code with the renderer measured where the light fell.",
+      "A whole session on a virtual rig whose ground truth is known. Two projectors and a camera were "
+      "calibrated from simulated captures, the markers were found in a simulated photograph, the parts were "
+      "projected onto the door, and a ray tracer that shares no code with the renderer measured where the "
+      "light fell.",
       result.rows, result.images};
   return write_demo_page(page, out / "demo.html");
 }
 
-// One image after the other; space shows the next at once, Escape ends.
+// Shows the images in turn; space shows the next one at once, Escape ends.
 void show_in(device::Window& window, const std::vector<DemoImage>& images) {
   constexpr double k_seconds_each = 4;
   auto shown_at = std::chrono::steady_clock::time_point();
@@ -53,7 +53,7 @@ void show_in(device::Window& window, const std::vector<DemoImage>& images) {
 Status run_demo(const DemoOptions& options) {
   LIMN_TRY_STATUS(make_folder(options.out));
   LIMN_TRY(device::GlContext gl, device::GlContext::create());
-  std::optional<device::Window> window;  // first, so that a missing display is told at once
+  std::optional<device::Window> window;  // first, so that a missing display is reported at once
   if (options.window) {
     LIMN_TRY(window, device::Window::open("Limn demo", 1280, 720));
   }

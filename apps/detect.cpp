@@ -35,17 +35,17 @@ struct DetectOutcome {
   int width = 0, height = 0;
   std::vector<Marker> markers;
   std::optional<double> ms;
-  std::string problem;  // empty: done
+  std::string problem;  // empty: no problem
 };
 
 // The camera for an image of this size. ARToolKit's files are meant to be scaled to the image (its own
-// programs do); all others say their size for good.
+// programs do that); all others are valid for one size only.
 Result<Imager> camera_for(const Imager& camera, const std::filesystem::path& file, int width, int height) {
   if (camera.width == 0 || (camera.width == width && camera.height == height)) return camera;
   const bool same_shape = camera.width * height == camera.height * width;
   if (file.extension() != ".dat" || !same_shape)
     return error(
-        "expected {}x{} pixels, the size of {}, found a picture of {}x{}. Use the camera's own pictures or "
+        "expected {}x{} pixels, the size of {}, found an image of {}x{}. Use the camera's own images or "
         "calibrate this size.",
         camera.width, camera.height, file.string(), width, height);
   Imager scaled = camera;
@@ -88,7 +88,7 @@ std::vector<tracker::MarkerPose> poses_of(const tracker::Detection& detection,
   if (options.pose == "ippe") return poses;
   const auto pose = tracker::triangle_pose(lens, size_m, detection.corners_px);
   if (!pose) return {};
-  // The paper's method knows no covariance; that of the refined pose, which it approximates, is the best
+  // The paper's method gives no covariance. That of the refined pose, which it approximates, is the best
   // guess.
   tracker::MarkerPose only{*pose, corner_rms(lens, size_m, *pose, detection), Matrix6d::Zero(), 1};
   if (!poses.empty()) only.covariance = poses[0].covariance;
@@ -121,7 +121,7 @@ void draw_text(cv::Mat& image, const std::string& text, const Eigen::Vector2d& c
   cv::putText(image, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, cv::Scalar(80, 255, 255), 1, cv::LINE_AA);
 }
 
-// x red, y green, z blue; z points into the paper, so its line leads away from the viewer.
+// x red, y green, z blue; z points into the paper, so its line leads away from the camera.
 void draw_axes(cv::Mat& image, const Lens& lens, const Pose& camera_from_marker, double size_m) {
   const auto origin = lens.project(camera_from_marker.translation);
   const std::array<cv::Scalar, 3> colours = {cv::Scalar(60, 60, 255), cv::Scalar(60, 220, 60),
@@ -152,7 +152,7 @@ cv::Mat drawn(const cv::Mat& grey, const DetectOutcome& outcome, const Lens* len
 
 // ---- results ----
 
-// A number where the family counts its markers, the file's name for templates.
+// A number if the family numbers its markers, the file's name for templates.
 nlohmann::json id_json(const std::string& id) {
   int number = 0;
   const auto [end, problem] = std::from_chars(id.data(), id.data() + id.size(), number);
@@ -168,7 +168,7 @@ nlohmann::json json_of(const Marker& marker) {
   for (std::size_t i = 0; i < 4; ++i) {
     const auto& px = marker.detection.corners_px[i];
     node["corners_px"].push_back({px.x(), px.y()});
-    // One number a corner: RMS of the two directions.
+    // One number for each corner: the RMS of the two directions.
     node["corner_stddev_px"].push_back(std::sqrt(0.5 * marker.detection.corner_covariance[i].trace()));
   }
   node["poses"] = nlohmann::json::array();
@@ -261,7 +261,8 @@ void detect_all(const DetectOptions& options,
                 const tracker::Families& families,
                 std::vector<DetectOutcome>* outcomes) {
   const int count = static_cast<int>(outcomes->size());
-  // Timed images come one after the other; threads beyond one an image share out the image.
+  // Timed images are processed one after the other. If there are more threads than images, each image gets
+  // several.
   const int images = options.repeat > 0 ? 1 : std::max(1, count);
   const int threads = std::clamp(options.threads, 1, images);
   std::atomic<int> next = 0;
@@ -288,7 +289,7 @@ void detect_all(const DetectOptions& options,
 }
 
 Status checked(const DetectOptions& options) {
-  if (options.images.empty()) return usage_error("limn detect: expected pictures, found none.");
+  if (options.images.empty()) return usage_error("limn detect: expected images, found none.");
   if (options.pose != "ippe" && options.pose != "triangle")
     return usage_error("--pose: expected ippe or triangle, found '{}'.", options.pose);
   if (options.encoding != "linear" && options.encoding != "srgb")
@@ -296,7 +297,7 @@ Status checked(const DetectOptions& options) {
   if (!std::isfinite(options.size_mm) || options.size_mm < 0)
     return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
   if (options.size_mm > 0 && options.camera.empty())
-    return usage_error("--size-mm: poses need a camera, too; add --camera X.cameramodel.");
+    return usage_error("--size-mm: poses also need a camera; add --camera X.cameramodel.");
   if (options.families.empty()) return usage_error("--family: expected at least one family, found none.");
   return {};
 }
@@ -328,7 +329,7 @@ Status run_detect(const DetectOptions& options) {
   const bool with_family = std::set(options.families.begin(), options.families.end()).size() > 1;
   if (!options.csv.empty()) LIMN_TRY_STATUS(write_file(options.csv, csv_text(outcomes, with_family)));
   if (!options.json.empty()) LIMN_TRY_STATUS(write_file(options.json, json_text(outcomes)));
-  if (failed > 0) return error("{} of {} pictures could not be worked on.", failed, outcomes.size());
+  if (failed > 0) return error("{} of {} images could not be processed.", failed, outcomes.size());
   return {};
 }
 

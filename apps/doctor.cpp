@@ -27,12 +27,12 @@ using Clock = std::chrono::steady_clock;
 using State = Finding::State;
 using Findings = std::vector<Finding>;
 
-// An error's own words say what to do.
+// The message of the error already says what to do.
 Finding failed(const std::string& area, const std::string& name, const std::string& message) {
   return {area, name, State::fails, message, ""};
 }
 
-// The names in a packages.txt.
+// The package names in a packages.txt.
 std::vector<std::string> packages_in(const std::string& text) {
   std::vector<std::string> names;
   std::istringstream lines(text);
@@ -44,7 +44,7 @@ std::vector<std::string> packages_in(const std::string& text) {
   return names;
 }
 
-// Names of the packages that Debian's status file says are installed.
+// Names of the packages that are installed according to Debian's status file.
 std::set<std::string> installed_in(const std::string& text) {
   std::set<std::string> names;
   std::istringstream lines(text);
@@ -63,7 +63,7 @@ Finding packages(const DoctorOptions& options) {
   const auto status = read_file(options.installed);
   if (!wanted || !status)
     return {"packages", "Debian", State::note,
-            fmt::format("cannot be looked up: {}", wanted ? status.message() : wanted.message()), ""};
+            fmt::format("cannot be checked: {}", wanted ? status.message() : wanted.message()), ""};
   const auto names = packages_in(*wanted);
   const auto there = installed_in(*status);
   std::string missing;
@@ -77,7 +77,7 @@ Finding packages(const DoctorOptions& options) {
 }
 
 Finding clock_of_session() {
-  constexpr double k_coarsest_s = 1e-4;  // prediction wants better than a tenth of a millisecond
+  constexpr double k_coarsest_s = 1e-4;  // prediction needs better than a tenth of a millisecond
   timespec resolution{};
   clock_getres(CLOCK_MONOTONIC, &resolution);
   double step_s = 1;
@@ -106,7 +106,7 @@ Finding gl() {
                         text.find("swrast") != std::string::npos;
   return {
       "gl", "OpenGL 4.5", State::works, text + (software ? ": software" : ": hardware"),
-      software ? "Pictures are right but slow: for a live session install the graphics card's driver." : ""};
+      software ? "Images are right but slow: for a live session install the graphics card's driver." : ""};
 }
 
 Finding described(const device::Monitor& monitor) {
@@ -115,11 +115,10 @@ Finding described(const device::Monitor& monitor) {
                   monitor.refresh_hz, monitor.position.x, monitor.position.y);
   const bool largest = monitor.size == monitor.largest;
   return {"displays", monitor.name, State::works, text,
-          largest
-              ? ""
-              : fmt::format(
-                    "It has {}x{}, too: a projector that is fed another size than its own blurs patterns.",
-                    monitor.largest.width, monitor.largest.height)};
+          largest ? ""
+                  : fmt::format("It also has {}x{}: a projector blurs patterns when it is driven in a size "
+                                "other than its native one.",
+                                monitor.largest.width, monitor.largest.height)};
 }
 
 Findings displays(const Result<device::Desktop>& desktop, bool asked_for) {
@@ -133,7 +132,7 @@ Findings displays(const Result<device::Desktop>& desktop, bool asked_for) {
   return findings;
 }
 
-// What a camera delivered in about a second.
+// The frames of a camera in about one second.
 struct Rate {
   int frames = 0;
   double per_second = 0;  // by the stamps; 0: unknown
@@ -156,11 +155,11 @@ Result<Rate> measured(device::CameraSource& camera) {
 }
 
 std::string shown(const device::CameraSetting& setting) {
-  if (!setting.found) return fmt::format(", {} asked {:g}", setting.name, setting.asked);
-  return fmt::format(", {} {:g} (asked {:g})", setting.name, *setting.found, setting.asked);
+  if (!setting.found) return fmt::format(", {} requested {:g}", setting.name, setting.asked);
+  return fmt::format(", {} {:g} (requested {:g})", setting.name, *setting.found, setting.asked);
 }
 
-// Opens the camera, grabs from it and compares what was asked with what it says.
+// Opens the camera, grabs frames and compares the requested settings with the reported ones.
 Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   auto camera = device::open_camera(wanted);
   if (!camera) return failed(area, wanted.name, camera.message());
@@ -168,7 +167,7 @@ Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   if (!rate) return failed(area, wanted.name, rate.message());
   const cv::Size size = (*camera)->size();
   std::string text = fmt::format("{}: {}x{}", wanted.source, size.width, size.height);
-  if (rate->per_second > 0) text += fmt::format(", {:.1f} frames a second", rate->per_second);
+  if (rate->per_second > 0) text += fmt::format(", {:.1f} frames per second", rate->per_second);
   std::string problems;
   for (const device::CameraSetting& setting : (*camera)->settings()) {
     text += shown(setting);
@@ -179,8 +178,8 @@ Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   return {area, wanted.name, problems.empty() ? State::works : State::fails, text, problems};
 }
 
-// What is plugged in or answers, whatever the file names. A camera of the file is tested as the file wants
-// it.
+// All cameras that are connected or answer, except those of the file, which are tested with the file's
+// settings.
 Findings cameras(const Devices& devices) {
   const auto named = [&](const std::string& source) {
     return std::any_of(devices.cameras.begin(), devices.cameras.end(),
@@ -197,12 +196,12 @@ Findings cameras(const Devices& devices) {
     if (!named(fmt::format("gige:{}", id)))
       findings.push_back({"cameras", id, State::note, fmt::format("answers as gige:{}", id), ""});
   if (findings.empty() && devices.cameras.empty())
-    findings.push_back({"cameras", "none", State::note, "no camera is plugged in or answers",
-                        "Plug one in, or name a network camera in a devices file (config/README.md)."});
+    findings.push_back({"cameras", "none", State::note, "no camera is connected or answers",
+                        "Connect one, or name a network camera in a devices file (config/README.md)."});
   return findings;
 }
 
-// Shows every display its number and colour until the time is over; the moment's last word on each.
+// Shows its number and colour on every display until the time is over. Returns the latest result for each.
 Findings show_signs(const std::vector<std::unique_ptr<device::Display>>& shown, double seconds) {
   Findings findings(shown.size());
   const Stamp until = shifted(Clock::now(), seconds);
@@ -224,7 +223,7 @@ void add(Findings* findings, const Findings& more) {
   findings->insert(findings->end(), more.begin(), more.end());
 }
 
-// The displays of the file, or all monitors. Those that cannot be opened are told.
+// The displays of the file, or all monitors. Displays that cannot be opened are reported.
 Findings signs(const DoctorOptions& options, const Devices& devices, const Result<device::Desktop>& desktop) {
   const device::Desktop* there = desktop ? &*desktop : nullptr;
   std::vector<device::DisplayConfig> wanted = devices.displays;
@@ -303,7 +302,8 @@ std::vector<Finding> examined(const DoctorOptions& options) {
 
 Status run_doctor(const DoctorOptions& options) {
   if (!options.rig.empty() && options.devices.empty())
-    return usage_error("--rig: expected --devices with it, whose names and sizes it is compared with.");
+    return usage_error(
+        "--rig: expected --devices with it, because its names and sizes are compared with the rig's.");
   const Findings findings = examined(options);
   if (options.json) print_json(findings);
   if (!options.json) print_lines(findings);

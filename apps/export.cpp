@@ -33,13 +33,14 @@ ordered_json report_of(const ExportJob& job) {
 
 void print(const ordered_json& report) {
   for (const auto& projector : report["projectors"]) {
-    fmt::print("{}: {}x{}, {:.1f} % of the pixels light the prototype, {:.1f} % share their light{}\n",
-               projector["name"].get<std::string>(), projector["size"][0].get<int>(),
-               projector["size"][1].get<int>(), 100 * projector["lit_share"].get<double>(),
-               100 * projector["shared_share"].get<double>(),
-               projector["most_black_lift"] > 0 ? fmt::format(", black is lifted by up to {:.4f} of white",
-                                                              projector["most_black_lift"].get<double>())
-                                                : std::string());
+    fmt::print(
+        "{}: {}x{}, {:.1f} % of the pixels reach the prototype, {:.1f} % share it with other projectors{}\n",
+        projector["name"].get<std::string>(), projector["size"][0].get<int>(),
+        projector["size"][1].get<int>(), 100 * projector["lit_share"].get<double>(),
+        100 * projector["shared_share"].get<double>(),
+        projector["most_black_lift"] > 0 ? fmt::format(", black is raised by up to {:.4f} of white",
+                                                       projector["most_black_lift"].get<double>())
+                                         : std::string());
   }
 }
 

@@ -23,13 +23,13 @@ Result<std::vector<tracker::Detection>> found_in(const std::filesystem::path& pa
   LIMN_TRY(const cv::Mat grey, read_grey_image(path));
   if (camera.width > 0 && (grey.cols != camera.width || grey.rows != camera.height))
     return error(
-        "{}: expected a picture of the camera's size {}x{}, found {}x{}. Use pictures of the same camera and "
+        "{}: expected an image of the camera's size {}x{}, found {}x{}. Use images of the same camera and "
         "mode.",
         path.string(), camera.width, camera.height, grey.cols, grey.rows);
   return detector->detect(grey, &camera.lens);
 }
 
-// Three standard deviations along the body's axes.
+// Three consecutive standard deviations, one for each axis of the body.
 nlohmann::ordered_json deviations(const Matrix6d& covariance, int first, double scale) {
   nlohmann::ordered_json values;
   for (int i = first; i < first + 3; ++i) values.push_back(scale * std::sqrt(covariance(i, i)));
@@ -54,17 +54,17 @@ nlohmann::ordered_json json_of(const tracker::MarkerMap& learned, const std::str
 void print(const tracker::MarkerMap& learned) {
   for (const tracker::MappedMarker& marker : learned.markers) {
     const Eigen::Vector3d p_mm = 1e3 * marker.marker.body_from_marker.translation;
-    fmt::print("{:<24} at ({:.2f}, {:.2f}, {:.2f}) mm, +- {:.2f} mm, {:.2f} degrees, {} pictures\n",
+    fmt::print("{:<24} at ({:.2f}, {:.2f}, {:.2f}) mm, +- {:.2f} mm, {:.2f} degrees, {} images\n",
                marker.marker.marker.text(), p_mm.x(), p_mm.y(), p_mm.z(),
                1e3 * std::sqrt(marker.covariance.bottomRightCorner<3, 3>().trace()),
                k_degrees * std::sqrt(marker.covariance.topLeftCorner<3, 3>().trace()), marker.images);
   }
-  fmt::print("{} markers from {} pictures, {:.3f} px; the frame is {}'s\n", learned.markers.size(),
+  fmt::print("{} markers from {} images, {:.3f} px; the body's frame is that of {}\n", learned.markers.size(),
              learned.images, learned.rms_px, learned.frame.text());
   for (const MarkerName& marker : learned.unplaced)
     log_warning(
-        "{}: seen in no picture together with the others; left out. Add a picture that shows it beside one "
-        "of them.",
+        "{}: no image shows it together with the others; it is left out. Add an image that shows it beside "
+        "one of them.",
         marker.text());
 }
 
@@ -82,7 +82,7 @@ Status run_learn_body(const LearnBodyOptions& options) {
   if (!families) return usage_error("--family: {}", families.message());
   tracker::Detector detector(*families);
   std::vector<std::vector<tracker::Detection>> detections;
-  Imager at_origin = camera;  // a body's frame knows no world
+  Imager at_origin = camera;  // a body's frame has no world frame
   at_origin.imager_from_world = Pose{};
   Progress progress("detect", static_cast<int>(options.images.size()));
   for (const auto& path : options.images) {

@@ -13,11 +13,11 @@ struct LearnBodyOptions {
   std::filesystem::path camera;
   std::string family = "aruco_4x4_50";
   double size_mm = 40;
-  std::filesystem::path out;  ///< body.json (limn.body/1)
+  std::filesystem::path out;  ///< Body file to write (limn.body/1).
 };
 
-/// Learns from images of a rigid thing where its markers stand on it and writes that as limn.body/1
-/// (config/README).
+/// Measures from images of a rigid body where its markers are on it, and writes that as limn.body/1
+/// (config/README.md).
 Status run_learn_body(const LearnBodyOptions& options);
 
 }  // namespace limn::apps

@@ -37,7 +37,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double k_camera_limit_s = 0.5;  // so that the session ends in under a second
+constexpr double k_camera_limit_s = 0.5;  // short, so that the session ends in under a second
 
 // Set by SIGINT and SIGTERM.
 std::atomic<bool> g_is_ended = false;
@@ -45,24 +45,26 @@ void end_session(int) { g_is_ended = true; }
 
 Status check_options(const LiveOptions& options) {
   if (!(options.seconds >= 0) || options.seconds > 1e6)
-    return usage_error("--seconds: expected seconds, 0 for no end, found {}.", options.seconds);
+    return usage_error("--seconds: expected a number of seconds, or 0 for no end, found {}.",
+                       options.seconds);
   if (!(options.extrapolate_s > 0 && options.extrapolate_s <= 5))
     return usage_error("--extrapolate: expected seconds over 0 and at most 5, found {}.",
                        options.extrapolate_s);
   if (!options.devices.empty() && options.rig.empty())
     return usage_error("--devices: expected --rig and --scene with it, found neither.");
   if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
-    return usage_error("--devices: expected no --world and --script with it, which are of the virtual rig.");
+    return usage_error(
+        "--devices: expected no --world and no --script with it, because they are for the virtual rig.");
   if (!options.serve_show.empty() && options.serve.empty())
     return usage_error("--serve-show: expected --serve with it, found none.");
   if (options.rig.empty() != options.scene.empty())
     return usage_error(
-        "expected --rig and --scene together, found one of them. Without both the session is in a "
-        "virtual world.");
+        "expected --rig and --scene together, found one of them. Without both the session runs in a virtual "
+        "world.");
   return {};
 }
 
-// What stands in the virtual room, and what the session is told of it.
+// The virtual room's true content, and what the session knows about it.
 struct Stage {
   sim::World world;
   SessionSetup setup;
@@ -95,7 +97,7 @@ Result<Stage> virtual_stage(const LiveOptions& options) {
   return stage;
 }
 
-// A rig is for the devices that it was measured on.
+// A rig is valid only for the devices that it was measured on.
 Status check_fits(const Rig& rig, const Rig& devices) {
   for (const auto& [wanted, there] :
        {std::pair{&rig.cameras, &devices.cameras}, {&rig.projectors, &devices.projectors}}) {
@@ -116,7 +118,7 @@ Status check_fits(const Rig& rig, const Rig& devices) {
   return {};
 }
 
-// What options say of a session, beside where it takes place.
+// Copies the options into the setup, except those for devices and virtual rig.
 Status set_up(const LiveOptions& options, SessionSetup* setup) {
   const auto prediction = tracker::prediction_of(options.prediction);
   if (!prediction)
@@ -133,7 +135,7 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
   return {};
 }
 
-// The remote; null without one.
+// Opens the remote; null if it is not asked for.
 Result<std::unique_ptr<Server>> served(const LiveOptions& options, const SessionSetup& setup) {
   if (options.serve.empty()) return std::unique_ptr<Server>();
   if (!options.serve_show.empty() && !find_named(setup.rig.projectors, options.serve_show))
@@ -143,7 +145,7 @@ Result<std::unique_ptr<Server>> served(const LiveOptions& options, const Session
   serve.at = options.serve;
   LIMN_TRY(const fs::path own, user_folder());
   auto tablet_view = TabletView::create(setup, own / "lenses");
-  if (!tablet_view) log_warning("live: the remote shows no live pictures: {}", tablet_view.message());
+  if (!tablet_view) log_warning("live: the remote shows no live images: {}", tablet_view.message());
   LIMN_TRY(std::unique_ptr<Server> server,
            Server::open(serve, tablet_view ? image_providers(std::move(*tablet_view)) : ImageProviders{}));
   if (!options.serve_show.empty()) server->show_code(options.serve_show, Role::work);
@@ -159,8 +161,8 @@ Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
           }};
 }
 
-// Opens all that a session consists of beside where it takes place, plays it there, and closes it. `setup`
-// becomes what a replay will read of it.
+// Opens everything that sessions on devices and on the virtual rig have in common, calls `play`, and closes
+// it. `setup` becomes what a replay will read.
 Status played(const LiveOptions& options,
               SessionSetup setup,
               std::span<const scene::SkippedVariant> skipped_variants,
@@ -197,7 +199,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera = !stage.world.camera_effects.front().srgb;
-  log_info("live: no devices are named; the session runs on a virtual rig, on its own clock");
+  log_info("live: no devices are given; the session runs on a virtual rig with its own clock");
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
                                             : std::numeric_limits<double>::infinity();
@@ -220,11 +222,11 @@ bool is_projector(const Rig& rig, const std::string& display) {
   return find_named(rig.projectors, display) != nullptr;
 }
 
-// Opens what can be opened; what cannot is told of and left out.
+// Opens the devices. Those that cannot be opened are reported and left out.
 SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desktop* desktop) {
   SessionDevices out;
   const auto miss = [&out](const std::string& name, const char* kind, const std::string& why) {
-    log_warning("live: {}: {} The session goes on without it.", name, why);
+    log_warning("live: {}: {} The session continues without it.", name, why);
     out.missing.push_back({.name = name, .kind = kind, .works = false, .why = why});
   };
   for (device::CameraConfig wanted : devices.cameras) {

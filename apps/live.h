@@ -8,31 +8,31 @@
 namespace limn::apps {
 
 struct LiveOptions {
-  std::filesystem::path rig;      ///< empty: the virtual world's true one
-  std::filesystem::path scene;    ///< empty: the virtual world's
-  std::filesystem::path devices;  ///< limn.devices/1; empty: the virtual rig
-  std::filesystem::path world;    ///< of the virtual rig; empty: a room made for rig and scene
+  std::filesystem::path rig;      ///< Empty: the virtual world's true rig.
+  std::filesystem::path scene;    ///< Empty: the virtual world's scene.
+  std::filesystem::path devices;  ///< limn.devices/1; empty: the virtual rig.
+  std::filesystem::path world;    ///< World of the virtual rig; empty: a room made for rig and scene.
   std::filesystem::path script;
-  double seconds = 0;                ///< of the session's clock; 0: until it is ended
-  double resolution = 1;             ///< share of the virtual cameras' and projectors' pixels a side
-  double frame_period_s = 1 / 30.0;  ///< of the virtual rig's cameras
+  double seconds = 0;                ///< Length on the session's clock; 0: until somebody ends it.
+  double resolution = 1;             ///< Scale of the virtual devices' image sides, over 0 and at most 1.
+  double frame_period_s = 1 / 30.0;  ///< Frame period of the virtual rig's cameras.
   std::filesystem::path record;
   std::filesystem::path out;
   bool window = false;
   std::string prediction = "filtered";
   std::string marker_light = "keep-out";
-  bool refill = true;          ///< light lost to a shadow is given by other projectors
-  double extrapolate_s = 0.3;  ///< for which unseen markers are carried on
-  std::string osc;             ///< PORT or ADDRESS:PORT where other programs are heard; empty: not
-  std::string osc_to;          ///< HOST:PORT that is told what changes; empty: nobody
-  std::string serve;           ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none
-  std::string serve_show;      ///< projector that shows the remote's code at first; empty: none
+  bool refill = true;          ///< Other projectors fill shadows.
+  double extrapolate_s = 0.3;  ///< How long unseen markers are extrapolated.
+  std::string osc;             ///< PORT or ADDRESS:PORT at which OSC is received; empty: none.
+  std::string osc_to;          ///< HOST:PORT to which changes are sent by OSC; empty: none.
+  std::string serve;           ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none.
+  std::string serve_show;      ///< Projector that shows the remote's code at first; empty: none.
   bool json = false;
 };
 
-/// `limn live`, on devices or on the virtual rig: cameras -> tracker -> prediction to the photon ->
-/// projectors and a screen, until the window is closed, a signal comes or the time is over. With `out`:
-/// poses.csv, telemetry.csv, session.json, session.html and the last images. Prints what was measured.
+/// `limn live`, on devices or on the virtual rig: cameras -> tracker -> prediction to the moment of light ->
+/// projectors and a screen, until the window is closed, a signal comes or the time is over. With `out` it
+/// writes poses.csv, telemetry.csv, session.json, session.html and the last images. Prints the measurements.
 Status run_live(const LiveOptions& options);
 
 }  // namespace limn::apps

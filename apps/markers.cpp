@@ -14,7 +14,8 @@ Status run_markers(const MarkersOptions& options) {
   if (!options.compare.empty()) return compare_templates(options.compare, options.json);
   if (!options.train.empty()) return train_template(options.train, options.out);
   if (!options.mount.empty()) {
-    if (!options.board.empty()) return usage_error("--mount: holds a marker; leave --board out.");
+    if (!options.board.empty())
+      return usage_error("--mount: expected a marker, found --board with it. Leave --board out.");
     LIMN_TRY_STATUS(
         run_mount({options.size_mm, margin_mm(options.size_mm), options.paper_mm, options.mount}));
     if (options.out.empty()) return {};

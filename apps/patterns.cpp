@@ -28,19 +28,19 @@ Status write_response(const PatternsOptions& options, const PixelSize& size) {
   LIMN_TRY_STATUS(write_images(options.out, count,
                                [&](int i) { return calib::draw_response(i, size.width, size.height); }));
   LIMN_TRY_STATUS(calib::save_response_patterns(size.width, size.height, options.out / "patterns.json"));
-  fmt::print("{} response pictures of {}x{} in {}\n", count, size.width, size.height, options.out.string());
+  fmt::print("{} response images of {}x{} in {}\n", count, size.width, size.height, options.out.string());
   return {};
 }
 
-// The patterns by the response that the options name.
+// The patterns corrected by the response that the options name.
 Result<calib::Patterns> by_response(const PatternsOptions& options, const calib::Patterns& patterns) {
   if (options.linearise.empty()) return patterns;
   if (options.code != "phase")
-    return usage_error("--linearise: expected --code phase, found {}, which shows black and white alone.",
+    return usage_error("--linearise: expected --code phase, found {}, which shows only black and white.",
                        options.code);
   LIMN_TRY(const RigResponses responses, load_responses(options.linearise));
   if (options.name.empty() && responses.projectors.size() != 1)
-    return usage_error("--linearise {}: it holds {} projectors; say which with --name.",
+    return usage_error("--linearise {}: expected one projector in it, found {}. Choose one with --name.",
                        options.linearise.string(), responses.projectors.size());
   const std::string name = options.name.empty() ? responses.projectors[0].projector : options.name;
   const auto made = calib::linearised(patterns, responses.projectors, name);
@@ -58,7 +58,7 @@ Status run_patterns(const PatternsOptions& options) {
   LIMN_TRY(const calib::Patterns patterns, by_response(options, *plain));
   LIMN_TRY_STATUS(write_images(options.out, patterns.count(), [&](int i) { return patterns.image(i); }));
   LIMN_TRY_STATUS(calib::save_patterns(patterns, options.out / "patterns.json"));
-  fmt::print("{} pictures of {}x{} in {}\n", patterns.count(), size.width, size.height, options.out.string());
+  fmt::print("{} images of {}x{} in {}\n", patterns.count(), size.width, size.height, options.out.string());
   return {};
 }
 

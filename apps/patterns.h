@@ -9,16 +9,16 @@
 namespace limn::apps {
 
 struct PatternsOptions {
-  std::string projector;  ///< its size, "1280x800"
+  std::string projector;  ///< Size in pixels, "1280x800".
   std::string code = "gray";
   calib::CodeOptions code_options = calib::CodeOptions();
-  std::filesystem::path linearise = {};  ///< phase: the response.json that the waves are drawn by
-  std::string name = {};                 ///< of the projector in it; may be left out where it holds one alone
-  bool response = false;  ///< the images that measure the projector's response instead of a code
+  std::filesystem::path linearise = {};  ///< With phase: response.json that the waves are corrected by.
+  std::string name = {};                 ///< Projector in that file; may be empty if it holds only one.
+  bool response = false;  ///< The images that measure the projector's response instead of a code.
   std::filesystem::path out;
 };
 
-/// `limn patterns`: the code's (or the response's) numbered PNGs and patterns.json.
+/// `limn patterns`: writes the numbered PNGs of the code (or of the response) and patterns.json.
 Status run_patterns(const PatternsOptions& options);
 
 }  // namespace limn::apps

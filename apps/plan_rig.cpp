@@ -13,7 +13,7 @@ Status run_plan_rig(const PlanRigOptions& options) {
   LIMN_TRY(const DescribedRig described, load_described(options.described));
   auto predicted_accuracy = predict_accuracy(described);
   if (!predicted_accuracy)
-    return error("{}: no calibration comes of this rig: {}", options.described.string(),
+    return error("{}: this rig cannot be calibrated: {}", options.described.string(),
                  predicted_accuracy.message());
   if (options.json) {
     fmt::print("{}\n", design_json(*predicted_accuracy));

@@ -22,10 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double k_images_a_second = 10;  // shown, settled, photographed by an ordinary camera
+constexpr double k_images_a_second = 10;  // shown, settled and photographed by an ordinary camera
 constexpr double k_most_seconds = 15;
 
-// As many as fit into the time that a recheck may take, at least one.
+// As many poses as fit into the time that a recheck may take, at least one.
 size_t affordable_poses(const Plan& plan, const Rig& rig) {
   int images = 0;
   for (const Imager& projector : rig.projectors) {
@@ -38,7 +38,8 @@ size_t affordable_poses(const Plan& plan, const Rig& rig) {
 
 Status captured_virtually(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(Plan plan, load_plan(command.plan));
-  plan.code_options.inverses = false;  // the rig is all but known: sparse images, more devices in the time
+  plan.code_options.inverses =
+      false;  // the rig is almost known, so half the images are enough, and more devices fit into the time
   LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
   if (command.prototype && !world.scene)
     return error("{}: scene: expected a prototype for --prototype, found none.", plan.world.string());
@@ -63,14 +64,16 @@ Status captured_by_devices(const RecheckCommand& command, const fs::path& folder
   return captured_once(captures, rig, stage.surroundings(&writer));
 }
 
-// The captures folder that the command names or makes.
+// The captures folder that the command names, or that it captures now.
 Result<fs::path> captured(const RecheckCommand& command) {
   const int ways = !command.plan.empty() + !command.captures.empty() + !command.devices.empty();
   if (ways != 1)
     return usage_error("expected one of a captures folder, --plan and --devices, found {}.",
                        ways == 0 ? "none" : "several");
   if (command.prototype && command.plan.empty())
-    return usage_error("--prototype: expected --plan; captures and --devices need no such word.");
+    return usage_error(
+        "--prototype: expected --plan with it, found none. Leave --prototype out: captures and --devices do "
+        "not need it.");
   if (!command.captures.empty()) return command.captures;
   const fs::path folder = command.out / "captures";
   LIMN_TRY_STATUS(command.plan.empty() ? captured_by_devices(command, folder)
@@ -102,8 +105,8 @@ void print_table(const Rechecked& checked) {
     fmt::print("{}: turned {:.3f} ± {:.3f}°, moved {:.2f} ± {:.2f} mm: {:.2f} px, {:.2f} mm on the board\n",
                move.device, move.degrees, move.degrees_stddev, move.mm, move.mm_stddev, move.px,
                move.mm_on_board);
-  if (result.board_moved) fmt::print("the board has been touched: --still is not used\n");
-  fmt::print("{} ({} pictures, {:.1f} s at {:.0f} a second)\n", recheck_sentence(result), checked.images,
+  if (result.board_moved) fmt::print("the board has been moved: --still is not used\n");
+  fmt::print("{} ({} images, {:.1f} s at {:.0f} per second)\n", recheck_sentence(result), checked.images,
              checked.images / k_images_a_second, k_images_a_second);
 }
 

@@ -29,19 +29,18 @@
 namespace limn::apps {
 namespace {
 
-// Images by camera, in the rig's order; empty where none was given.
+// Images in the order of the rig's cameras; empty where none was given.
 using Frames = std::vector<cv::Mat>;
 
-// A camera file without a size (OpenCV's calibration writes none at times) takes its image's.
+// A camera file without a size (OpenCV's calibration sometimes writes none) takes the size of its image.
 Status accept(const cv::Mat& image, const std::string& file, Imager* camera) {
   if (camera->width == 0 && camera->height == 0) {
     camera->width = image.cols;
     camera->height = image.rows;
   }
   if (image.cols == camera->width && image.rows == camera->height) return {};
-  return error(
-      "{}: expected a picture of {}'s size {}x{}, found {}x{}. Give the picture as the camera took it.", file,
-      camera->name, camera->width, camera->height, image.cols, image.rows);
+  return error("{}: expected an image of {}'s size {}x{}, found {}x{}. Give the image as the camera took it.",
+               file, camera->name, camera->width, camera->height, image.cols, image.rows);
 }
 
 Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) {
@@ -49,7 +48,7 @@ Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) 
   for (const std::string& argument : arguments) {
     const auto equals = argument.find('=');
     if (equals == std::string::npos) {
-      return usage_error("--frame {}: expected CAMERA=PICTURE, such as camera0=picture.png.", argument);
+      return usage_error("--frame {}: expected CAMERA=IMAGE, such as camera0=photo.png.", argument);
     }
     const std::string name = argument.substr(0, equals), file = argument.substr(equals + 1);
     Imager* camera = find_named(rig->cameras, name);
@@ -82,7 +81,7 @@ Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig
   if (tracks.empty()) {
     return error(
         "frames: expected a marker of the scene's {} bodies, found {} markers of its families and none that "
-        "the scene names. Look at light, focus and marker names.",
+        "the scene names. Check light, focus and marker names.",
         bodies.size(), marker_count);
   }
   return tracks;
@@ -99,7 +98,7 @@ void report_missing(const scene::Scene& scene, const scene::PosedScene& posed) {
   }
 }
 
-// What makes images that surely are not meant.
+// Warns about input whose images are surely not intended.
 void report_odd(const scene::Scene& scene,
                 const Rig& rig,
                 const scene::PosedScene& posed,
@@ -111,7 +110,7 @@ void report_odd(const scene::Scene& scene,
   const Eigen::Vector3d p_eye =
       (viewer.imager_from_world * *posed.world_from_prototype).inverse().translation;
   if (box.contains(p_eye))
-    log_warning("render: the viewer's eye is inside the prototype's bounds; view parts will look wrong");
+    log_warning("render: the viewpoint is inside the prototype's bounds; view parts will look wrong");
   const auto sees = [&](const Imager& imager) {
     const Pose imager_from_prototype = imager.imager_from_world * *posed.world_from_prototype;
     return std::any_of(points.begin(), points.end(), [&](const Eigen::Vector3f& p) {
@@ -120,10 +119,10 @@ void report_odd(const scene::Scene& scene,
       return px && imager.contains(*px);
     });
   };
-  if (!sees(viewer)) log_warning("render: the viewer does not look at the prototype");
+  if (!sees(viewer)) log_warning("render: the viewer does not see the prototype");
   for (const Imager& projector : rig.projectors)
     if (!sees(projector))
-      log_warning("render: {} does not reach the prototype; its picture is black", projector.name);
+      log_warning("render: {} does not reach the prototype; its image is black", projector.name);
 }
 
 Result<scene::PosedScene> place(const RenderOptions& options,
@@ -139,7 +138,7 @@ Result<scene::PosedScene> place(const RenderOptions& options,
   return scene::posed(scene, tracks);
 }
 
-// Where markers stand by the scene as posed, be it from frames or from a file.
+// The bodies' poses that belong to the posed scene, whether it comes from frames or from a file.
 std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene& posed) {
   std::vector<Track> tracks;
   const auto add = [&](const std::string& body, const Pose& world_from_body) {
@@ -154,7 +153,7 @@ std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene&
   return tracks;
 }
 
-// The only one, or one at the eye that several share.
+// The only viewer, or one at the viewpoint that several share.
 Result<Imager> told_viewer(std::span<const std::filesystem::path> files,
                            const scene::Scene& scene,
                            const scene::PosedScene& posed,
@@ -168,16 +167,19 @@ Result<Imager> told_viewer(std::span<const std::filesystem::path> files,
   const auto p_middle = scene::middle_of(scene, posed);
   if (!p_middle) {
     return error(
-        "--viewer: expected one viewer, for neither the prototype nor a part was found that {} could "
-        "look at together.",
+        "--viewer: expected one viewer, because neither the prototype nor a part was found that {} viewers "
+        "could look at together.",
         files.size());
   }
   const scene::SharedViewpoint shared = scene::updated_viewpoint({}, eyes, *p_middle, 0);
   for (const scene::SharedViewpoint::Share& share : shared.shares)
-    fmt::print("{}: {:.0f} % of the eye{}\n", share.viewer, 100 * share.share,
+    fmt::print("{}: {:.0f} % of the shared viewpoint{}\n", share.viewer, 100 * share.share,
                share.viewer == shared.leader ? ", leads" : "");
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, posed, d_up_world);
-  if (!viewer) return error("--viewer: expected viewers apart from what they look at, found them there.");
+  if (!viewer)
+    return error(
+        "--viewer: expected viewers at a distance from what they look at, found the shared viewpoint in its "
+        "middle.");
   return *viewer;
 }
 
@@ -192,10 +194,10 @@ Result<Imager> choose_viewer(const RenderOptions& options,
   if (const auto viewer = scene::viewer_of(scene, posed, d_up_world)) return *viewer;
   if (rig.cameras.empty()) {
     return usage_error(
-        "--viewer: expected a viewer file, since neither the scene has a viewer nor the rig a camera.");
+        "--viewer: expected a viewer file, because neither the scene has a viewer nor the rig a camera.");
   }
   if (!scene.viewers.empty())
-    log_warning("render: none of the scene's viewers is seen; {} looks instead", rig.cameras[0].name);
+    log_warning("render: none of the scene's viewers is visible; {} is used instead", rig.cameras[0].name);
   return rig.cameras[0];
 }
 
@@ -223,7 +225,7 @@ Status write_coverage(const std::vector<projector::PartCoverage>& parts,
   return write_file(out / "coverage.json", json.dump(2) + "\n");
 }
 
-// The image without the lens's distortion: the same focal length, its principal point in the middle.
+// The image without lens distortion: the same focal length, the principal point in the middle.
 cv::Mat undistorted(const cv::Mat& image, const Imager& imager) {
   cv::Mat map(image.size(), CV_32FC2);
   for (int row = 0; row < map.rows; ++row)
@@ -239,7 +241,7 @@ cv::Mat undistorted(const cv::Mat& image, const Imager& imager) {
   return out;
 }
 
-// With frames, the cameras that have one; with poses alone all cameras, over black.
+// With frames: the cameras that have one. With poses alone: all cameras, over black.
 Status write_composites(projector::Renderer* renderer,
                         const RenderOptions& options,
                         const Rig& rig,
@@ -260,7 +262,7 @@ Status write_composites(projector::Renderer* renderer,
   return {};
 }
 
-// What a virtual camera sees, or two eyes on a line through its middle, the left one's image on the left.
+// The view of a virtual camera, or of two on a line through its position, the left one's image on the left.
 Status write_view(const RenderOptions& options,
                   const scene::PosedScene& posed,
                   projector::Renderer* renderer) {
@@ -270,7 +272,7 @@ Status write_view(const RenderOptions& options,
     return write_png(options.out / "view.png", renderer->view(camera, posed, background));
   cv::Mat eyes[2];
   for (int eye = 0; eye < 2; ++eye) {
-    Imager at_eye = camera;  // moves its eye: an imager's translation is the other way
+    Imager at_eye = camera;  // moves the camera: imager_from_world's translation has the opposite sign
     at_eye.imager_from_world.translation.x() += (eye == 0 ? 0.5 : -0.5) * 1e-3 * *options.stereo_mm;
     eyes[eye] = renderer->view(at_eye, posed, background);
   }
@@ -284,7 +286,7 @@ Status write_view(const RenderOptions& options,
 Status run_render(const RenderOptions& options) {
   if (options.frames.empty() && options.poses.empty()) {
     return usage_error(
-        "expected --frame CAMERA=PICTURE or --poses POSES.json to place the scene, found neither.");
+        "expected --frame CAMERA=IMAGE or --poses POSES.json to place the scene, found neither.");
   }
   if (options.composite != "full" && options.composite != "rest") {
     return usage_error("--composite: expected full or rest, found '{}'.", options.composite);
@@ -298,10 +300,12 @@ Status run_render(const RenderOptions& options) {
                        options.marker_light);
   }
   if (options.stereo_mm && options.view.empty())
-    return usage_error("--stereo: expected --view VIEWER.json with it, for the eyes' place.");
+    return usage_error(
+        "--stereo: expected --view VIEWER.json with it, which places the cameras, found none.");
   if (options.stereo_mm && !(std::abs(*options.stereo_mm) < 1000)) {
-    return usage_error("--stereo: expected a base line in millimetres (eyes are some 63 apart), found {}.",
-                       *options.stereo_mm);
+    return usage_error(
+        "--stereo: expected a distance of two cameras in millimetres (people's eyes: about 63), found {}.",
+        *options.stereo_mm);
   }
   LIMN_TRY(Rig rig, load_rig(options.rig));
   LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene));
@@ -335,9 +339,8 @@ Status run_render(const RenderOptions& options) {
   for (const projector::PartCoverage& part : coverage)
     if (part.viewer_pixels == 0)
       log_warning(
-          "render: the viewer sees nothing of '{}': the prototype hides it, the viewer stands behind, or "
-          "looks "
-          "elsewhere",
+          "render: the viewer sees nothing of '{}': the prototype hides it, or the viewer is behind it or "
+          "looks elsewhere",
           part.slot);
   return write_coverage(coverage, viewer, light_report(options.light, rig, renderer), options.out);
 }

@@ -13,26 +13,26 @@ namespace limn::apps {
 struct RenderOptions {
   std::filesystem::path rig;
   std::filesystem::path scene;
-  std::vector<std::string> frames;  ///< CAMERA=PICTURE
-  std::filesystem::path poses;      ///< POSES.json; places everything, frames are then only drawn over
-  /// Viewer files; none: the scene's, else camera 0. Several share an eye (scene/viewpoint.h), that of one
-  /// who has just come in.
+  std::vector<std::string> frames;  ///< CAMERA=IMAGE
+  std::filesystem::path poses;      ///< POSES.json that places everything; frames are then only drawn over.
+  /// Viewer files; empty: the scene's viewers, or else camera 0. Several viewers share one viewpoint
+  /// (scene/viewpoint.h), as if all had just arrived.
   std::vector<std::filesystem::path> viewers;
-  std::string composite = "full";  ///< or "rest": only what light cannot show
-  bool undistorted = false;        ///< composites without the cameras' distortion
-  std::string marker_light =
-      "as-is";  ///< projectors leave markers dark ("keep-out") or light them ("spotlight")
+  std::string composite = "full";  ///< full, or rest: only what light cannot show.
+  bool undistorted = false;        ///< Composites without the cameras' lens distortion.
+  /// Light on markers: as-is, keep-out (dark) or spotlight (white).
+  std::string marker_light = "as-is";
   LightArguments light;
-  std::string contact_shadow = "off";  ///< "on": parts darken the prototype around them, composites and view
-  std::filesystem::path view;          ///< viewer file of a virtual camera: writes view.png
-  std::optional<double> stereo_mm;     ///< base line: two eyes beside each other, view.png is twice as wide
+  std::string contact_shadow = "off";  ///< on: parts darken the prototype around them in composites and view.
+  std::filesystem::path view;          ///< Viewer file of a virtual camera: writes view.png.
+  std::optional<double> stereo_mm;     ///< Base line: two cameras side by side; view.png is twice as wide.
   std::filesystem::path out;
 };
 
-/// `limn render`: places the scene by the markers in the frames, or by the poses, and writes
-/// projector-NAME.png, composite-NAME.png (per camera with a frame; with poses alone per camera, over black),
-/// coverage.json, mask-PART.png, view.png where one is asked for and, where light is balanced,
-/// clipped-NAME.png of what it could not give (255: brighter, 128: darker).
+/// `limn render`: places the scene by the markers in the frames, or by the poses. Writes projector-NAME.png,
+/// composite-NAME.png (for each camera with a frame; with poses alone for each camera, over black),
+/// coverage.json, mask-PART.png, view.png if it is asked for and, if light is balanced, clipped-NAME.png:
+/// where the projector could not give the wanted light (255: brighter was wanted, 128: darker).
 Status run_render(const RenderOptions& options);
 
 }  // namespace limn::apps

@@ -23,7 +23,7 @@ using Json = nlohmann::ordered_json;
 
 Stamp stamp_of(std::int64_t nanoseconds) { return Stamp{} + std::chrono::nanoseconds(nanoseconds); }
 
-// Lines of events.jsonl, as far as they are whole.
+// Lines of events.jsonl up to the first damaged one.
 struct Events {
   std::vector<Json> all;
   std::optional<std::string> damage;
@@ -49,14 +49,15 @@ Result<Events> load_events(const fs::path& path) {
   return events;
 }
 
-// How many moments' frames had been watched when an event happened that depends on them; 0 for others.
+// The number of moments whose frames had been perceived when an event happened, if the event depends on it; 0
+// for others.
 std::size_t known_moments(const Json& event) {
   const bool depends = event.contains("paint") || event.contains("rig");
   return depends ? event.at("moments").get<std::size_t>() : event.value("moments", std::size_t{0});
 }
 
-// A recording as the frame loop's clock and source. A frame ends with an image; or where somebody did
-// something after more frames had been watched, for then they have to be perceived first.
+// A recording as the clock and source of the frame loop. A frame of the loop ends with an image, or earlier
+// if an edit happened after more camera frames had been perceived, because those must be perceived first.
 class Recording final : public FrameClock, public FrameSource {
  public:
   Recording(const ReplayOptions& options, const Events& events, Perception* perception, Session* session)
@@ -77,17 +78,18 @@ class Recording final : public FrameClock, public FrameSource {
   } catch (const nlohmann::json::exception& problem) {
     return damage(problem);
   }
-  // The newest frame as it was recorded.
+  // The newest image's record.
   struct PaintedBefore {
     Json poses, images;
   };
   const PaintedBefore& painted() const { return painted_; }
-  // How many events have happened.
+  // Number of events replayed.
   int passed() const { return static_cast<int>(at_); }
 
   bool is_over() const override { return !next(); }
 
-  // Frames that the next event knew of; a thread of its own watched them, perhaps further than that.
+  // Perceives the camera frames that the next event depends on. In the session another thread perceived them,
+  // perhaps ahead of the event.
   Result<Perceived> perceive() override try {
     while (next() && next()->contains("watch")) queue_frames();
     Perceived out;
@@ -98,7 +100,7 @@ class Recording final : public FrameClock, public FrameSource {
       unwatched_.pop_front();
     }
     out.watched = perception_->watched();
-    out.watched->uses.clear();  // what came of them was recorded as edits
+    out.watched->uses.clear();  // their effects were recorded as edits
     out.moments = moments_;
     return out;
   } catch (const nlohmann::json::exception& problem) {
@@ -118,7 +120,7 @@ class Recording final : public FrameClock, public FrameSource {
  private:
   const Json* next() const { return at_ < events_.size() ? &events_[at_] : nullptr; }
   void pass() { ++at_; }
-  // Whether all frames that an event knew of were perceived.
+  // Whether all camera frames that an event depends on were perceived.
   bool is_perceived(const Json& event) const { return known_moments(event) <= asked_; }
 
   Error damage(const nlohmann::json::exception& problem) const {
@@ -176,7 +178,7 @@ class Recording final : public FrameClock, public FrameSource {
 
   Status show(const std::string& folder) {
     LIMN_TRY(const fs::path path, inside(folder));
-    std::vector<scene::SkippedVariant> skipped_variants;  // as the session left it out
+    std::vector<scene::SkippedVariant> skipped_variants;  // the session left them out, too
     LIMN_TRY(scene::Scene scene, scene::load_scene(path, &skipped_variants));
     return session_->show(std::move(scene), session_->watched().captured_at);
   }
@@ -197,7 +199,7 @@ class Recording final : public FrameClock, public FrameSource {
 
   void wait_for(Stamp shown_at) {
     if (options_.step) {
-      fmt::print(stderr, "{:.3f} s; enter for the next picture\n", seconds_between(Stamp{}, shown_at));
+      fmt::print(stderr, "{:.3f} s; press enter for the next image\n", seconds_between(Stamp{}, shown_at));
       std::string line;
       std::getline(std::cin, line);
       return;
@@ -214,14 +216,14 @@ class Recording final : public FrameClock, public FrameSource {
   Perception* perception_;
   Session* session_;
   std::size_t at_ = 0;                   // the next event
-  std::deque<const Json*> unwatched_;    // frames of moments
-  std::size_t moments_ = 0, asked_ = 0;  // that were watched; that events knew of
+  std::deque<const Json*> unwatched_;    // moments whose frames are not perceived yet
+  std::size_t moments_ = 0, asked_ = 0;  // moments perceived; moments needed by the next event
   PaintedBefore painted_;
   Stamp now_;
   std::optional<std::pair<std::chrono::steady_clock::time_point, Stamp>> begun_;
 };
 
-// Compares what is painted with the recording, and may show a screen in a window.
+// Compares what is painted with the recording, and can show a screen in a window.
 class Comparison final : public FrameSink {
  public:
   Comparison(const Recording* recording, const Session* session, std::optional<device::Window> window)
@@ -249,14 +251,14 @@ class Comparison final : public FrameSink {
   // Error: what differs from the recording.
   Status result(const fs::path& session) const {
     if (first_pose_)
-      return error("{}: expected the recorded poses, found others in {} of {} pictures, first at {:.3f} s.",
+      return error("{}: expected the recorded poses, found others in {} of {} images, first at {:.3f} s.",
                    session.string(), other_poses_, images_, *first_pose_);
     if (first_image_)
       return error(
-          "{}: expected the recorded projector pictures, found others in {} of {}, first at {:.3f} s "
-          "(poses are identical; another machine or driver draws a little differently).",
+          "{}: expected the recorded projector images, found others in {} of {}, first at {:.3f} s (poses "
+          "are identical; another machine or driver draws a little differently).",
           session.string(), other_images_, images_, *first_image_);
-    log_info("replay: {} pictures, poses and pictures identical to the recording's", images_);
+    log_info("replay: {} images, poses and images are identical to the recorded ones", images_);
     return {};
   }
 
@@ -293,7 +295,7 @@ Status run_replay(const ReplayOptions& options) {
   LIMN_TRY_STATUS(output.close(&session, options.json));
   LIMN_TRY_STATUS(comparison.result(options.session));
   LIMN_TRY_STATUS(played);
-  if (events.damage) return error("{}; what stands before it was replayed.", *events.damage);
+  if (events.damage) return error("{}; the events before it were replayed.", *events.damage);
   return {};
 }
 

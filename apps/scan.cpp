@@ -29,7 +29,7 @@ calib::ScanOptions options_of(const ScanCommand& command) {
 Status checked(const ScanCommand& command) {
   if (command.captures.empty() == command.plan.empty())
     return usage_error(
-        "expected a captures folder, or --plan PLAN.json to take the pictures on its virtual rig, found {}.",
+        "expected a captures folder, or --plan PLAN.json to capture on its virtual rig, found {}.",
         command.captures.empty() ? "neither" : "both");
   if (command.near_m < 0 || command.far_m < 0 || (command.far_m > 0 && command.far_m <= command.near_m))
     return usage_error("--near {} --far {}: expected 0 <= near < far, in metres from the camera.",

@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// The images to shine, one per projector; those not named stay black.
+// The images to project, one for each projector; projectors that are not named stay black.
 Result<std::vector<cv::Mat>> shown_images(const std::vector<std::string>& show, const Rig& rig) {
   std::vector<cv::Mat> shown(rig.projectors.size());
   for (const std::string& text : show) {
@@ -31,8 +31,8 @@ Result<std::vector<cv::Mat>> shown_images(const std::vector<std::string>& show, 
     const Imager* projector = find_named(rig.projectors, name);
     if (equals == std::string::npos || !projector)
       return usage_error(
-          "--show: expected PROJECTOR=PICTURE with a projector of the world, found '{}'. Try --show "
-          "projector0=picture.png.",
+          "--show: expected PROJECTOR=IMAGE with a projector of the world, found '{}'. Try --show "
+          "projector0=image.png.",
           text);
     LIMN_TRY(const cv::Mat image, read_image(text.substr(equals + 1)));
     if (image.cols != projector->width || image.rows != projector->height)
@@ -67,7 +67,7 @@ Result<std::vector<std::string>> chosen_variants(const std::string& text, const 
 
 ordered_json pose_json(const Pose& pose) { return ordered_json(to_json(pose)); }
 
-// Outer corners of the black square, pixel per camera; whether each is in the image with nothing before it.
+// The outer corners of the black square in pixels of each camera, and whether the camera sees them all.
 ordered_json marker_json(const sim::World& world, const sim::Truth& truth, const sim::PlacedMarker& marker) {
   const Pose world_from_marker = *sim::world_from_marker(world, marker.marker);
   ordered_json json = {{"name", marker.marker.text()},
@@ -106,7 +106,7 @@ Status write_truth(const sim::World& world, const scene::PosedScene& parts, cons
   return write_file(out / "truth.json", json.dump(2) + "\n");
 }
 
-// One camera and what it sees; numbers the shots so that each has its own noise.
+// What one camera sees. It numbers the photographs so that each has its own noise.
 struct Shooting {
   std::string camera;
   sim::Samples samples;
@@ -132,7 +132,7 @@ Status shoot(Shooting& shooting,
   const double shot_ms =
       1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   LIMN_TRY_STATUS(write_png(file, image));
-  fmt::print("{}  {}x{}, shot in {:.0f} ms\n", file.string(), image.cols, image.rows, shot_ms);
+  fmt::print("{}  {}x{}, photographed in {:.0f} ms\n", file.string(), image.cols, image.rows, shot_ms);
   return {};
 }
 
@@ -144,7 +144,7 @@ Status shoot_camera(const sim::World& world,
   std::vector<cv::Mat> white;
   for (const Imager& projector : world.rig.projectors)
     white.emplace_back(projector.height, projector.width, CV_8U, cv::Scalar(255));
-  sim::World dark = world;  // projectors switched off, their black light too
+  sim::World dark = world;  // all projectors off, without their black light
   for (sim::ProjectorEffects& effects : dark.projector_effects) effects.black_level = 0;
   Shooting shooting = traced(world, camera);
   LIMN_TRY_STATUS(shoot(shooting, dark, {}, options.out, "ambient"));

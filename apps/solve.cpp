@@ -31,7 +31,7 @@ void print_report(const calib::Report& report) {
     fmt::print("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
   for (const calib::ScaleBarCheck& check : report.scale_bar_lengths) {
     if (!check.views.empty())
-      fmt::print("length {} to {}: expected {:.2f} mm, measured {:.2f} mm, deviation {:.2f} mm\n",
+      fmt::print("length {} to {}: expected {:.2f} mm, measured {:.2f} mm, standard deviation {:.2f} mm\n",
                  check.known.from, check.known.to, 1e3 * check.known.length_m, 1e3 * check.measured_m,
                  1e3 * check.stddev_m);
   }

@@ -5,7 +5,7 @@
 
 namespace limn::apps {
 
-/// `limn solve`: as solved(), and prints a table; `is_json`: report.json instead.
+/// `limn solve`: calls solved() and prints a table. `is_json`: prints report.json instead.
 Status run_solve(const SolveCommandOptions& options, bool is_json = false);
 
 }  // namespace limn::apps

@@ -40,7 +40,7 @@ Result<ExportJob> load_export_job(const ExportOptions& options) {
   if (!job.scene.prototype)
     return error("{}: expected a scene with a prototype, found none.", options.scene.string());
   if (!job.posed.world_from_prototype)
-    return error("{}: world_from_prototype: expected where the prototype stands, found nothing.",
+    return error("{}: world_from_prototype: expected the pose of the prototype, found none.",
                  options.poses.string());
   if (!options.viewer.empty()) {
     LIMN_TRY(job.viewer, scene::load_viewer(options.viewer));
@@ -52,10 +52,10 @@ Result<ExportJob> load_export_job(const ExportOptions& options) {
   };
   if (!job.viewer && std::any_of(exporters().begin(), exporters().end(), needs_viewer))
     return usage_error(
-        "--viewer: expected a viewer file for --profile 3d and --looks, since the scene has none.");
+        "--viewer: expected a viewer file for --profile 3d and --looks, because the scene has none.");
   for (const Exporter& exporter : exporters())
     if (job.posed.parts.empty() && exporter.is_asked_for(options) && exporter.needs_parts)
-      return error("{}: slots: expected the place of a part for --{}, found none.", options.poses.string(),
+      return error("{}: slots: expected the pose of a part for --{}, found none.", options.poses.string(),
                    exporter.name);
   return job;
 }

@@ -5,8 +5,8 @@
 
 namespace limn::apps {
 
-/// The bytes of an OpenEXR file of a CV_32FC3 image: its channels are R, G and B, 32-bit floats, zip
-/// compressed, the top row first; `comment` says what they mean.
+/// The bytes of an OpenEXR file for a CV_32FC3 image: channels R, G and B, 32-bit floats, zip compressed, top
+/// row first. `comment` is stored in the file and says what the channels mean.
 std::string exr_bytes(const cv::Mat& image, const std::string& comment);
 
 }  // namespace limn::apps

@@ -11,7 +11,7 @@
 namespace limn::apps {
 namespace {
 
-// Every placed slot's variants, one at a time, as the viewer sees them over black.
+// Draws every placed slot's variants, one at a time, as the viewer sees them over black.
 Status write_looks(const ExportJob& job, const ExportOptions& options) {
   LIMN_TRY_STATUS(make_folder(options.looks));
   Rig rig;

@@ -4,7 +4,7 @@
 
 namespace limn::apps {
 
-/// An image for each variant of each placed slot, as the viewer sees it over black.
+/// Writes an image for each variant of each placed slot, as the viewer sees it over black.
 Exporter look_exporter();
 
 }  // namespace limn::apps

@@ -15,7 +15,7 @@ using Eigen::Vector3d;
 
 constexpr double k_degree = std::numbers::pi / 180;
 
-// The frustum's image by the tangents of its edges, x right, y down.
+// The edges of the frustum's image as tangents, x right, y down.
 struct Edges {
   double left = 0, right = 0, top = 0, bottom = 0;
 };
@@ -29,7 +29,7 @@ Matrix3d turn(double angle, const Vector3d& axis) {
   return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
 }
 
-// Columns: the frame's right, down and forward, the axes of an imager that is not turned.
+// The columns are the frame's right, down and forward: the axes of an imager that is not turned.
 Matrix3d axes_of(const MpcdiFrame& frame) {
   Matrix3d axes;
   axes << frame.d_right, frame.d_down, frame.d_forward;
@@ -44,12 +44,12 @@ Matrix3d rotation_of(const MpcdiFrustum& frustum) {
 // Sets the three angles so that rotation_of() gives `r`.
 void set_angles(const Matrix3d& r, MpcdiFrustum* frustum) {
   frustum->pitch = std::asin(std::clamp(-r(1, 2), -1.0, 1.0)) / k_degree;
-  const bool is_upright = std::hypot(r(0, 2), r(2, 2)) < 1e-9;  // yaw and roll turn about the same line
+  const bool is_upright = std::hypot(r(0, 2), r(2, 2)) < 1e-9;  // yaw and roll then turn about the same axis
   frustum->roll = is_upright ? 0 : std::atan2(r(1, 0), r(1, 1)) / k_degree;
   frustum->yaw = (is_upright ? std::atan2(-r(2, 0), r(0, 0)) : std::atan2(r(0, 2), r(2, 2))) / k_degree;
 }
 
-// Around the tangents of the border of the imager's image.
+// The bounds of the tangents along the border of the imager's image.
 Edges edges_of(const Imager& imager) {
   constexpr double k_most = std::numeric_limits<double>::max();
   Edges edges{k_most, -k_most, k_most, -k_most};

@@ -31,7 +31,7 @@ MpcdiBlendMap alpha_map(const cv::Mat& blend, double gamma, int bits) {
   return {as_levels(share, bits), gamma};
 }
 
-// The display values that give the lift, BGR: what must at least be shown so that black is even.
+// The display values that give the lift, BGR: at least these must be shown so that black is even.
 MpcdiBlendMap beta_map(const cv::Mat& blend, const ProjectorResponse* response, int bits) {
   const double black = response && response->black_level ? response->black_level->value : 0;
   cv::Mat values(blend.size(), CV_32FC3, cv::Scalar::all(0));
@@ -50,7 +50,7 @@ MpcdiBlendMap beta_map(const cv::Mat& blend, const ProjectorResponse* response, 
   return {as_levels(values, bits), 1};
 }
 
-// CV_32FC3: the place (x right, y down, 0 … 1) of each point in the viewer's image; NaN outside.
+// CV_32FC3: the position (x right, y down, 0 … 1) of each point in the viewer's image; NaN outside.
 cv::Mat places_for(const Imager& viewer, const Pose& viewer_from_prototype, const cv::Mat& points) {
   cv::Mat places(points.size(), CV_32FC3, cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()));
   for (int row = 0; row < points.rows; ++row) {
@@ -84,7 +84,7 @@ Mpcdi mpcdi_of(const ExportJob& job, const ExportOptions& options) {
   for (std::size_t i = 0; i < job.maps.size(); ++i) {
     Imager projector = job.rig.projectors[i];
     projector.imager_from_world =
-        projector.imager_from_world * world_from_prototype;  // the world of the file
+        projector.imager_from_world * world_from_prototype;  // the file's world is the prototype
     MpcdiRegion region;
     region.id = projector.name;
     region.buffer = "prototype";
@@ -94,7 +94,7 @@ Mpcdi mpcdi_of(const ExportJob& job, const ExportOptions& options) {
     region.alpha = alpha_map(job.maps[i].blend, options.gamma, options.bits);
     if (has_lift) {
       cv::cvtColor(region.alpha->image, region.alpha->image,
-                   cv::COLOR_GRAY2BGR);  // as colour level 2 asks
+                   cv::COLOR_GRAY2BGR);  // required by colour level 2
       region.beta = beta_map(job.maps[i].blend, find_response(job.rig, projector.name), options.bits);
     }
     if (options.profile == "sl") {
@@ -105,7 +105,7 @@ Mpcdi mpcdi_of(const ExportJob& job, const ExportOptions& options) {
       const Pose viewer_from_prototype = job.viewer->imager_from_world * world_from_prototype;
       region.warp = places_for(*job.viewer, viewer_from_prototype, job.maps[i].points);
       Imager viewer = *job.viewer;
-      viewer.imager_from_world = Pose();  // the eye is the origin, its line of sight is forward
+      viewer.imager_from_world = Pose();  // the viewpoint is the origin, its optical axis is forward
       MpcdiFrame own;
       own.d_down = Eigen::Vector3d::UnitY();
       own.d_forward = Eigen::Vector3d::UnitZ();

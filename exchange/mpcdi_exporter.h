@@ -4,7 +4,7 @@
 
 namespace limn::apps {
 
-/// An archive of MPCDI 2.0 with every projector's points, shares and pose.
+/// Writes an archive of MPCDI 2.0 with every projector's points, shares and pose.
 Exporter mpcdi_exporter();
 
 }  // namespace limn::apps

@@ -22,11 +22,11 @@ using pugi::xml_node;
 
 constexpr std::size_t k_most_file_bytes = std::size_t{2} << 30;
 constexpr std::size_t k_most_xml_bytes = std::size_t{16} << 20;
-constexpr std::size_t k_most_map_bytes = std::size_t{2} << 30;  // of all maps together, unpacked
+constexpr std::size_t k_most_map_bytes = std::size_t{2} << 30;  // all maps together, unpacked
 constexpr int k_most_side = 16384;
-constexpr std::int64_t k_most_pixels = std::int64_t{1} << 26;  // of a map; 8K has half of them
+constexpr std::int64_t k_most_pixels = std::int64_t{1} << 26;  // one map; 8K has half as many
 
-// The standard, its two versions and its readers differ in upper and lower case.
+// The standard, its two versions and the programs that read it differ in upper and lower case.
 bool is_same_name(const char* a, const char* b) { return ::strcasecmp(a, b) == 0; }
 
 xml_node child_of(const xml_node& node, const char* name) {
@@ -94,7 +94,7 @@ Result<MpcdiFrustum> read_frustum(const xml_node& node, const std::string& where
   return frustum;
 }
 
-// A pinhole's; with a lens of its own kind Mystique writes angles that mean nothing.
+// Checks a pinhole's angles. With a lens type of its own, Mystique writes angles that mean nothing.
 Status check_angles(const MpcdiFrustum& frustum, const std::string& where) {
   const auto in_range = [](double low, double high) { return -90 < low && low < high && high < 90; };
   if (in_range(frustum.left, frustum.right) && in_range(frustum.down, frustum.up)) return {};
@@ -114,7 +114,7 @@ Result<MpcdiFrame> read_frame(const xml_node& node, const std::string& where) {
       LIMN_TRY((*vector)[i], number_in(node, fmt::format("{}{}", name, "xyz"[i]).c_str(), where));
     }
   }
-  constexpr double k_rounding = 1e-3;  // of files with few digits
+  constexpr double k_rounding = 1e-3;  // for files with few digits
   if ((frame.d_right.cross(frame.d_down) - frame.d_forward).norm() > k_rounding ||
       std::abs(frame.d_right.norm() - 1) > k_rounding || std::abs(frame.d_down.norm() - 1) > k_rounding) {
     return error(
@@ -140,7 +140,7 @@ bool leads_out(const std::string& path) {
          std::any_of(parts.begin(), parts.end(), [](const fs::path& part) { return part == ".."; });
 }
 
-// Width and height that a PNG's header says.
+// Width and height from a PNG's header.
 std::optional<cv::Size> png_size(const std::string& bytes) {
   if (!bytes.starts_with("\x89PNG\r\n\x1a\n") || bytes.size() < 33) return std::nullopt;
   const auto number = [&](std::size_t at) {
@@ -153,7 +153,7 @@ std::optional<cv::Size> png_size(const std::string& bytes) {
 
 Result<cv::Mat> read_png(const std::string& bytes, const cv::Size& wanted, const std::string& where) {
   const auto size = png_size(bytes);
-  if (!size) return error("{}: expected a PNG picture, found {} other bytes.", where, bytes.size());
+  if (!size) return error("{}: expected a PNG image, found {} other bytes.", where, bytes.size());
   if (*size != wanted) {
     return error("{}: expected the region's size {}x{}, found {}x{}. Export it again.", where, wanted.width,
                  wanted.height, size->width, size->height);
@@ -168,14 +168,13 @@ Result<cv::Mat> read_png(const std::string& bytes, const cv::Size& wanted, const
     }
   }
   if (image.empty())
-    return error("{}: expected a whole PNG picture, found a truncated or damaged one. Export it again.",
-                 where);
+    return error("{}: expected a whole PNG image, found a truncated or damaged one. Export it again.", where);
   if (image.channels() != 1 && image.channels() != 3)
-    return error("{}: expected a grey or RGB picture, found {} channels.", where, image.channels());
+    return error("{}: expected a grey or RGB image, found {} channels.", where, image.channels());
   return image;
 }
 
-// The XML document and, in an archive, what it names.
+// Reads the XML document and, in an archive, the files that it names.
 class Reader {
  public:
   explicit Reader(const fs::path& path) : where_(path.string()) {}
@@ -202,11 +201,11 @@ class Reader {
   std::string where_;
   std::optional<ZipArchive> archive_;
   std::size_t unpacked_ = 0;
-  std::map<std::string, double> units_;  // of a region's lengths, where its warp says
+  std::map<std::string, double> units_;  // unit of each region's lengths in metres, if its warp names one
   Mpcdi out_;
 };
 
-// In an archive `mpcdi.xml`, or whatever other XML is alone in it.
+// In an archive: `mpcdi.xml`, or the only other XML file.
 Result<std::string> Reader::find_xml(std::string bytes) {
   if (!bytes.starts_with("PK")) {
     const auto first = bytes.find_first_not_of(" \t\r\n\xef\xbb\xbf");
@@ -251,7 +250,7 @@ Result<Mpcdi> Reader::read() {
   if (out_.regions.empty())
     return error("{}: display: expected a buffer with at least one region, found none.", where_);
   LIMN_TRY_STATUS(read_extensions(child_of(root, "extensionSet")));
-  // Mystique writes them beside an empty `files`.
+  // Mystique writes filesets beside an empty `files`.
   for (const xml_node& parent : {child_of(root, "files"), root}) {
     for (const xml_node& fileset : children_of(parent, "fileset")) LIMN_TRY_STATUS(read_fileset(fileset));
   }
@@ -281,7 +280,7 @@ Status Reader::read_region(const xml_node& node, const std::string& buffer) {
   region.buffer = buffer;
   const std::string where = fmt::format("{}: region '{}'", where_, region.id);
   if (region.id.empty() || find_region(region.id))
-    return error("{}: expected an id that no other region has, found this.", where);
+    return error("{}: expected an id that no other region has, found this one again or an empty one.", where);
   double width = 0, height = 0;
   const std::pair<const char*, double*> wanted[] = {{"xResolution", &width},   {"yResolution", &height},
                                                     {"x", &region.x},          {"y", &region.y},
@@ -336,8 +335,8 @@ Result<cv::Mat> Reader::read_floats(const xml_node& map,
       read_map(map, where, static_cast<std::size_t>(std::min(pixels, k_most_pixels)) * 12 + k_header_bytes));
   LIMN_TRY(cv::Mat floats, read_pfm(bytes, where, k_most_pixels));
   if (floats.cols > region.width || floats.rows > region.height || floats.cols < 2 || floats.rows < 2) {
-    return error("{}: expected from 2x2 nodes to one a pixel ({}x{}), found {}x{}. Export it again.", where,
-                 region.width, region.height, floats.cols, floats.rows);
+    return error("{}: expected from 2x2 nodes to one for each pixel ({}x{}), found {}x{}. Export it again.",
+                 where, region.width, region.height, floats.cols, floats.rows);
   }
   return floats;
 }
@@ -362,11 +361,11 @@ Result<MpcdiBlendMap> Reader::read_blend_map(const xml_node& map,
   const int bits = child_of(map, "bitDepth").text().as_int(0);
   const int found = out.image.depth() == CV_16U ? 16 : 8;
   if (bits != 0 && bits != found)
-    out_.remarks.push_back(fmt::format("{}: bitDepth says {}, the picture has {}", where, bits, found));
+    out_.remarks.push_back(fmt::format("{}: bitDepth says {}, the image has {}", where, bits, found));
   return out;
 }
 
-// NaN where there is none; points in metres.
+// Missing nodes become NaN; points become metres.
 Status Reader::read_warp(const xml_node& node, const std::string& where, MpcdiRegion* region) {
   const std::string unit = trimmed(child_of(node, "geometricUnit").text().get());
   const bool has_points = out_.profile == "a3" || out_.profile == "sl";
@@ -382,7 +381,7 @@ Status Reader::read_warp(const xml_node& node, const std::string& where, MpcdiRe
   LIMN_TRY(region->warp, read_floats(node, where, *region));
   int known = 0;
   for (auto p = region->warp.begin<cv::Vec3f>(); p != region->warp.end<cv::Vec3f>(); ++p) {
-    // The third number of a place is an error of it, or NaN.
+    // The third number of a position is its error, or NaN.
     const bool is_known = std::isfinite((*p)[0]) && std::isfinite((*p)[1]) &&
                           (!has_points || std::isfinite((*p)[2])) &&
                           !((*p)[0] == 0 && (*p)[1] == 0 && (!has_points || (*p)[2] == 0));
@@ -415,7 +414,7 @@ Status Reader::read_fileset(const xml_node& node) {
   }
   for (const char* table : {"decodeLUT", "correctLUT", "encodeLUT"})
     if (has_path(child_of(node, table)))
-      out_.remarks.push_back(fmt::format("{}: {} passed over", where, table));
+      out_.remarks.push_back(fmt::format("{}: {} is ignored", where, table));
   return {};
 }
 
@@ -452,12 +451,13 @@ Status Reader::read_extensions(const xml_node& set) {
   return {};
 }
 
-// What can only be said once the file has been read.
+// Checks that are possible only after the whole file was read.
 Status Reader::check_regions() {
   for (MpcdiRegion& region : out_.regions) {
     const std::string where = fmt::format("{}: region '{}'", where_, region.id);
     if (out_.profile == "sl" && !(region.frustum && region.frame))
-      return error("{}: expected a frustum and a coordinateFrame in profile sl, found not both.", where);
+      return error("{}: expected a frustum and a coordinateFrame in profile sl, found at most one of them.",
+                   where);
     if (out_.profile != "sl" && region.warp.empty())
       return error("{}: expected a fileset with a geometryWarpFile in profile {}, found none.", where,
                    out_.profile);
@@ -466,7 +466,7 @@ Status Reader::check_regions() {
     if (const auto unit = units_.find(region.id); region.frame && unit != units_.end())
       region.frame->p_eye *= unit->second;
     if (region.has_other_lens)
-      out_.remarks.push_back(where + ": a fisheye or anamorphic lens, which Limn cannot take over");
+      out_.remarks.push_back(where + ": a fisheye or anamorphic lens, which Limn does not support");
   }
   return {};
 }

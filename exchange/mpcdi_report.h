@@ -6,7 +6,7 @@
 
 namespace limn::apps {
 
-/// What an MPCDI file holds (limn.import/1).
+/// A report of what an MPCDI file holds (limn.import/1).
 nlohmann::ordered_json mpcdi_report(const Mpcdi& mpcdi);
 
 }  // namespace limn::apps

@@ -7,7 +7,7 @@
 namespace limn::apps {
 namespace {
 
-// A name for a device, and so for its file, that the rig does not have yet.
+// A device name, also used as file name, that the rig does not have yet.
 std::string name_of(std::string id, const Rig& rig) {
   std::replace_if(
       id.begin(), id.end(), [](char c) { return c == '/' || static_cast<unsigned char>(c) < ' '; }, '_');
@@ -24,7 +24,7 @@ Result<Rig> mpcdi_rig(const Mpcdi& mpcdi, const std::string& file) {
       imager->name = name_of(region.id, rig);
       rig.projectors.push_back(*imager);
       if (!region.lens && !region.distortion.empty())
-        log_warning("import: {}: its distortion map is left out; the rig has the frustum's pinhole",
+        log_warning("import: {}: its distortion map is ignored; the rig has the frustum's pinhole",
                     region.id);
     } else {
       log_warning("import: {}: left out of the rig", region.id);

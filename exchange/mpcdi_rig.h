@@ -8,8 +8,8 @@
 
 namespace limn::apps {
 
-/// The projectors that a pinhole, or a lens of Limn's, describes; their world is the frame of `file`. Error:
-/// there is none.
+/// The projectors that are described by a pinhole or by one of Limn's lenses; their world frame is the
+/// coordinate frame of `file`. Error: there is none.
 Result<Rig> mpcdi_rig(const Mpcdi& mpcdi, const std::string& file);
 
 }  // namespace limn::apps

@@ -15,9 +15,9 @@ void add(pugi::xml_node parent, const char* name, const std::string& text) {
   parent.append_child(name).text().set(text.c_str());
 }
 
-// Without an exponent, which not every reader knows.
+// Writes no exponent, because not every reader accepts one.
 void add_decimals(pugi::xml_node parent, const char* name, double number) {
-  add(parent, name, fmt::format("{:.15f}", number + 0.0));  // + 0.0: no -0
+  add(parent, name, fmt::format("{:.15f}", number + 0.0));  // + 0.0 turns -0 into 0
 }
 
 void add(pugi::xml_node parent, const char* axis, const Eigen::Vector3d& v) {
@@ -27,7 +27,8 @@ void add(pugi::xml_node parent, const char* axis, const Eigen::Vector3d& v) {
 void add_region(pugi::xml_node buffer, const MpcdiRegion& region) {
   pugi::xml_node node = buffer.append_child("region");
   node.append_attribute("id") = region.id.c_str();
-  // The standard's two versions and their readers spell these in three ways, and look for their own only.
+  // The standard's two versions and the programs that read it spell these names in three ways, and each looks
+  // only for its own.
   for (const char* name : {"xResolution", "Xresolution"}) node.append_attribute(name) = region.width;
   for (const char* name : {"yResolution", "Yresolution"}) node.append_attribute(name) = region.height;
   node.append_attribute("x") = region.x;
@@ -70,7 +71,7 @@ void add_blend_map(pugi::xml_node fileset,
   if (name == std::string("alphaMap")) add(node, "gammaEmbedded", fmt::format("{}", map.gamma_embedded));
 }
 
-// The region's entry, and its maps as files.
+// Adds the region's entry, and its maps as files.
 void add_fileset(pugi::xml_node parent,
                  const MpcdiRegion& region,
                  bool has_points,
@@ -123,7 +124,7 @@ Status write_mpcdi(const std::filesystem::path& path, const Mpcdi& mpcdi) {
   pugi::xml_document document;
   pugi::xml_node root = document.append_child("MPCDI");
   root.append_attribute("profile") = mpcdi.profile.c_str();
-  root.append_attribute("geometry") = 2;  // warps of a node a pixel
+  root.append_attribute("geometry") = 2;  // warps with one node for each pixel
   root.append_attribute("color") = mpcdi.colour_level;
   root.append_attribute("date") = mpcdi.date.c_str();
   root.append_attribute("version") = mpcdi.version.c_str();

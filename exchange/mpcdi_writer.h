@@ -7,7 +7,8 @@
 
 namespace limn::apps {
 
-/// Writes an archive of MPCDI 2.0: mpcdi.xml, the maps as PFM and PNG. `path` is either old or complete.
+/// Writes an archive of MPCDI 2.0: mpcdi.xml, and the maps as PFM and PNG. The file at `path` is replaced
+/// only when the new one is complete.
 Status write_mpcdi(const std::filesystem::path& path, const Mpcdi& mpcdi);
 
 }  // namespace limn::apps

@@ -11,7 +11,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-// The number at the front of `text`, which then begins behind the one byte of white space that ends it.
+// Reads the number at the front of `text` and removes it with the one byte of white space that ends it.
 template <class Number>
 std::optional<Number> taken(std::string_view* text) {
   const std::size_t first = text->find_first_not_of(" \t\r\n");
@@ -59,7 +59,7 @@ Result<cv::Mat> read_pfm(const std::string& bytes, const std::string& where, std
   std::optional<double> scale = -1;
   if (text.size() != wanted) scale = taken<double>(&text);
   if (!scale || *scale == 0)
-    return error("{}: expected a PFM's scale (-1 when little-endian) behind its size, found none.", where);
+    return error("{}: expected a PFM's scale (-1 for little-endian) after its size, found none.", where);
   if (text.size() != wanted) {
     return error("{}: expected {} bytes for {}x{} pixels, found {}. Export it again.", where, wanted, *width,
                  *height, text.size());

@@ -8,12 +8,12 @@
 
 namespace limn::apps {
 
-/// What one projector lights and how its light is to be blended.
+/// The points that one projector reaches, and how its light is blended.
 struct ProjectorMaps {
   cv::Mat points;           ///< Renderer::surface_points
   cv::Mat blend;            ///< Renderer::blend
-  int lit = 0, shared = 0;  ///< pixels that light the prototype; that share their light with others
-  double most_lift = 0;     ///< of black, as a share of white
+  int lit = 0, shared = 0;  ///< Pixels that reach the prototype; pixels that share it with other projectors.
+  double most_lift = 0;     ///< Largest lift of black, as a share of white.
 };
 
 ProjectorMaps projector_maps(projector::Renderer* renderer,

@@ -4,7 +4,7 @@
 
 namespace limn::apps {
 
-/// A floating-point image for each projector: the point that each of its pixels lights.
+/// Writes a floating-point image for each projector: the points that its pixels light.
 Exporter warp_exporter();
 
 }  // namespace limn::apps

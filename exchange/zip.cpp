@@ -81,7 +81,7 @@ Result<std::string> ZipArchive::read(const std::string& name, std::size_t most_b
   zip_int64_t got = 0;
   do {
     content.resize(length + k_step);
-    got = zip_fread(file, content.data() + length, k_step);  // checks the content's CRC when it meets the end
+    got = zip_fread(file, content.data() + length, k_step);  // checks the content's CRC at its end
     if (got > 0) length += static_cast<std::size_t>(got);
   } while (got > 0 && length <= most_bytes);
   const std::string problem = zip_file_strerror(file);
@@ -97,8 +97,8 @@ Result<std::string> zipped(const std::vector<ZipFile>& files) {
   zip_error_init(&problem);
   zip_source_t* target = zip_source_buffer_create(nullptr, 0, 0, &problem);
   zip_t* archive = target ? zip_open_from_source(target, ZIP_TRUNCATE, &problem) : nullptr;
-  if (!archive) return error("zip archive: cannot begin one: {}.", text_of(&problem));
-  zip_source_keep(target);  // still there when the archive is closed
+  if (!archive) return error("zip archive: cannot create one: {}.", text_of(&problem));
+  zip_source_keep(target);  // keeps it after the archive is closed
   zip_error_fini(&problem);
   for (const ZipFile& file : files) {
     zip_source_t* source = zip_source_buffer(archive, file.content.data(), file.content.size(), 0);
@@ -118,7 +118,7 @@ Result<std::string> zipped(const std::vector<ZipFile>& files) {
     zip_source_close(target);
   }
   zip_source_free(target);
-  if (!is_read) return error("zip archive: cannot be packed: {}.", text_of(ZIP_ER_MEMORY));
+  if (!is_read) return error("zip archive: cannot be written: {}.", text_of(ZIP_ER_MEMORY));
   return bytes;
 }
 

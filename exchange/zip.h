@@ -13,13 +13,13 @@ namespace limn::apps {
 /// A zip archive in memory.
 class ZipArchive {
  public:
-  /// Error, with `where` before it: a truncated or damaged archive, or none.
+  /// Error, which begins with `where`: no archive, or a truncated or damaged one.
   static Result<ZipArchive> open(std::string bytes, const std::string& where);
 
-  /// In the archive's order.
+  /// The files' names in the archive's order.
   std::vector<std::string> names() const;
-  /// A file's content. Error, whose message does not say where: absent, damaged, encrypted, or more than
-  /// `most_bytes` when unpacked, whatever the archive says.
+  /// The content of a file. The error does not name the archive: the file is absent, damaged, encrypted, or
+  /// larger than `most_bytes` when unpacked, whatever size the archive states.
   Result<std::string> read(const std::string& name, std::size_t most_bytes) const;
 
  private:
@@ -31,10 +31,10 @@ class ZipArchive {
 struct ZipFile {
   std::string name;
   std::string content;
-  bool is_packed = false;  ///< its bytes have been compressed already
+  bool is_packed = false;  ///< The content is compressed already.
 };
 
-/// The bytes of an archive of these files.
+/// The bytes of an archive with these files.
 Result<std::string> zipped(const std::vector<ZipFile>& files);
 
 }  // namespace limn::apps

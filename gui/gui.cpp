@@ -22,7 +22,7 @@ constexpr const char* k_bold_font = "/usr/share/fonts/truetype/dejavu/DejaVuSans
 // Latin, dashes and dots, arrows, geometric shapes, ticks.
 constexpr std::array<ImWchar, 11> k_glyphs = {0x20,   0x17F,  0x2010, 0x2026, 0x2190, 0x2193,
                                               0x25A0, 0x25FF, 0x2713, 0x2717, 0};
-// GLFW's codes, in the order of ImGui's.
+// GLFW's key codes in the order of ImGui's keys.
 constexpr std::array<int, ImGuiKey_COUNT> k_keys = {258, 263, 262, 265, 264, 266, 267, 268, 269, 260, 261,
                                                     259, 32,  257, 256, 335, 'A', 'C', 'V', 'X', 'Y', 'Z'};
 constexpr int k_shift = 340, k_control = 341, k_right_shift = 344, k_right_control = 345;
@@ -96,7 +96,7 @@ void Gui::feed(cv::Size pixels, double seconds, const device::WindowInput& input
   io.MousePos = is_inside ? ImVec2(input.pointer.x, input.pointer.y) : ImVec2(k_nowhere, k_nowhere);
   for (std::size_t i = 0; i < input.buttons.size(); ++i) io.MouseDown[i] = input.buttons[i];
   io.MouseWheel = input.wheel;
-  // A key that was let go within the frame that it was pressed in is let go in the next one.
+  // A key that was released in the same frame as it was pressed is reported as released in the next frame.
   for (const int code : released_) io.KeysDown[code] = false;
   released_.clear();
   for (const device::WindowInput::Key& key : input.keys) {
@@ -183,7 +183,8 @@ void text_within(float width, ImU32 colour, const std::string& text) {
     std::size_t length = text.size();
     do {
       do --length;
-      while (length > 0 && (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80);  // whole characters
+      while (length > 0 &&
+             (static_cast<unsigned char>(text[length]) & 0xC0) == 0x80);  // cut only between characters
       shown = text.substr(0, length) + "…";
     } while (length > 0 && is_wide());
   }

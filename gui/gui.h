@@ -13,7 +13,7 @@
 
 namespace limn::apps {
 
-/// Colours that mean something, on dark ground.
+/// Colours with fixed meanings, on a dark background.
 namespace colour {
 constexpr ImU32 k_text = IM_COL32(232, 230, 225, 255), k_quiet = IM_COL32(169, 166, 159, 255),
                 k_line = IM_COL32(60, 65, 74, 255), k_panel = IM_COL32(27, 30, 36, 255),
@@ -22,16 +22,16 @@ constexpr ImU32 k_text = IM_COL32(232, 230, 225, 255), k_quiet = IM_COL32(169, 1
                 k_blue = IM_COL32(127, 180, 255, 255), k_violet = IM_COL32(190, 140, 255, 255);
 }  // namespace colour
 
-/// An image as it lies in a window.
+/// An image as it is placed in a window.
 struct PlacedImage {
   ImVec2 corner, size;
-  float scale = 1;  ///< window pixels an image's pixel
-  /// Where a pixel of the image lies in the window (pixel centres at integers).
+  float scale = 1;  ///< Window pixels for each image pixel.
+  /// The position in the window of a point of the image (pixel centres at integers).
   ImVec2 of(const Eigen::Vector2d& px) const;
 };
 
-/// Dear ImGui with Limn's theme, in a GL context that is current at every call, creation and destruction
-/// included.
+/// Dear ImGui with Limn's theme. Its GL context must be current at every call, also at creation and
+/// destruction.
 class Gui {
  public:
   /// `scale`: 1 on ordinary displays, 2 where pixels are half as large.
@@ -40,8 +40,8 @@ class Gui {
   Gui& operator=(const Gui&) = delete;
   ~Gui();
 
-  /// A frame over all of the bound framebuffer: `widgets` calls ImGui's functions within one borderless
-  /// ImGui window of that size. `seconds` since the last frame.
+  /// Draws a frame over the whole bound framebuffer: `widgets` calls ImGui's functions in one borderless
+  /// ImGui window of that size. `seconds` is the time since the last frame.
   void frame(cv::Size pixels,
              double seconds,
              const device::WindowInput& input,
@@ -50,12 +50,12 @@ class Gui {
   /// Whether the keys of the last frame went into a text field.
   bool is_typing() const;
 
-  /// Shows an 8-bit grey or BGR image as large as it fits into the place, centred; `name` keeps its texture
-  /// from frame to frame. `is_linear`: its values are proportional to light, not yet encoded for the eye.
+  /// Shows an 8-bit grey or BGR image, centred and as large as fits. `name` keeps its texture from frame to
+  /// frame. `is_linear`: its values are proportional to light and not yet sRGB-encoded.
   PlacedImage image(
       const std::string& name, const cv::Mat& image, ImVec2 corner, ImVec2 size, bool is_linear = false);
 
-  float em() const { return em_; }  ///< pixels of the text's height
+  float em() const { return em_; }  ///< Height of the text in pixels.
   ImFont* heading() const { return heading_; }
 
  private:
@@ -68,20 +68,20 @@ class Gui {
   ImGuiContext* context_ = nullptr;
   ImFont* heading_ = nullptr;
   bool is_typing_ = false;
-  std::vector<int> released_;  // keys, let go in the last frame
+  std::vector<int> released_;  // keys released in the last frame
   std::map<std::string, Texture> textures_;
 };
 
-/// A line of text in a colour, cut with … where the place ends; the whole text stands in a tooltip then.
+/// A line of text in a colour, cut with … if it is too wide; then a tooltip shows the whole text.
 void text_within(float width, ImU32 colour, const std::string& text);
 
-/// A heading of a group.
+/// The heading of a group.
 void heading(const Gui& gui, const std::string& text);
 
-/// A button that is lit in a colour while what it switches is on.
+/// A button that has the colour `lit` while its switch is on.
 bool toggle(const std::string& label, bool is_on, ImU32 lit, ImVec2 size);
 
-/// Text drawn at a place over an image, with ground behind it.
+/// Text drawn over an image, on a background of its own.
 void label_at(ImVec2 corner, ImU32 colour, const std::string& text);
 
 }  // namespace limn::apps

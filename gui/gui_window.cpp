@@ -7,7 +7,7 @@ namespace limn::apps {
 namespace {
 
 constexpr double k_period_s = 1 / 30.0, k_touched_s = 1 / 60.0;  // between images
-constexpr double k_pause = 3;                                    // times what an image cost
+constexpr double k_pause = 3;                                    // multiple of an image's drawing time
 
 }  // namespace
 
@@ -15,7 +15,7 @@ Result<GuiWindow> GuiWindow::open(const device::Desktop& desktop,
                                   const std::string& title,
                                   int width,
                                   int height) {
-  cv::Size most;  // of the monitors
+  cv::Size most;  // the largest monitor
   for (const device::Monitor& monitor : desktop.monitors())
     if (monitor.size.area() > most.area()) most = monitor.size;
   const auto within = [](int wanted, int there) { return there > 0 ? std::min(wanted, there) : wanted; };

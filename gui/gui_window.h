@@ -13,11 +13,11 @@
 
 namespace limn::apps {
 
-/// A window of the desktop that Dear ImGui draws in. Belongs to the main thread; leaves the GL context that
-/// is current alone and never waits for the monitor.
+/// A window of the desktop that Dear ImGui draws in. It must be used by the main thread. It does not change
+/// the current GL context and never waits for the monitor.
 class GuiWindow {
  public:
-  /// As large as wanted, and no larger than the largest monitor.
+  /// Opens a window of this size, but no larger than the largest monitor.
   static Result<GuiWindow> open(const device::Desktop& desktop,
                                 const std::string& title,
                                 int width,
@@ -26,14 +26,14 @@ class GuiWindow {
   GuiWindow& operator=(GuiWindow&& other) noexcept;
   ~GuiWindow();
 
-  /// Handles events. The keys that were pressed (GLFW's codes) and went into no text field.
+  /// Handles events and returns the pressed keys (GLFW's codes) that went into no text field.
   std::vector<int> pressed_keys();
-  /// Whether to draw anew: 30 times a second, soon after a person did something, and never so often that
-  /// drawing takes more than a quarter of the time. `also_s`: what is done for each image beside it.
+  /// Whether to draw again: 30 times a second, sooner after a person did something, and never so often that
+  /// drawing takes more than a quarter of the time. `also_s`: time of other work that is done for each image.
   bool is_due(double also_s = 0) const;
-  /// Draws; `widgets` as in Gui::frame.
+  /// Draws the window; `widgets` as in Gui::frame.
   void draw(const std::function<void(Gui&)>& widgets);
-  /// False once the person has closed it.
+  /// False after the person has closed it.
   bool is_wanted() const { return window_.is_wanted(); }
 
  private:
@@ -42,7 +42,7 @@ class GuiWindow {
 
   device::Window window_;
   std::unique_ptr<Gui> gui_;
-  device::WindowInput input_;  // since it was drawn
+  device::WindowInput input_;  // since the last drawing
   bool is_touched_ = false;
   Clock::time_point drawn_at_{};
   double cost_s_ = 0;

@@ -23,7 +23,7 @@ int side_px(const ConfigNode& node, double value) {
   return 1;
 }
 
-// As a viewer file, or with eye_m and target_m instead of the pose.
+// Reads a viewer as in a viewer file, or with eye_m and target_m instead of the pose.
 Imager read_imager(const ConfigNode& node) {
   std::vector<double> size = node.at("size").numbers(2);
   size.resize(2, 1);
@@ -40,7 +40,7 @@ Imager read_imager(const ConfigNode& node) {
   if (d.head<2>().norm() < 1e-6 * std::max(1.0, d.norm())) {
     node.at("target_m")
         .problem(
-            "expected a target apart from the eye and not straight above or below it. Give "
+            "expected a target at a distance from the eye and not straight above or below it. Give "
             "world_from_viewer instead.");
     return viewer_imager({}, width, height, fov_deg);
   }
@@ -64,7 +64,7 @@ Viewer read_viewer(const ConfigNode& node, bool is_one_of_several) {
   return viewer;
 }
 
-// One, or a list of several.
+// Reads one viewer, or a list of several.
 std::vector<Viewer> read_viewers(const ConfigNode& node) {
   if (!node.is_array()) return {read_viewer(node, false)};
   std::vector<Viewer> viewers;
@@ -90,7 +90,7 @@ std::vector<CheckLimit> read_limits(const ConfigNode& node) {
   return limits;
 }
 
-// The world with another scene's prototype in it instead of its own.
+// Replaces the world's scene, and the prototype in the world by that scene's.
 void put_on_stage(scene::Scene scene, sim::World* world) {
   world->scene = std::move(scene);
   std::erase_if(world->objects, [](const sim::Object& object) { return object.name == "prototype"; });
@@ -130,7 +130,7 @@ SlotPlace read_slot(const ConfigNode& node, const scene::Slot& slot, const Pose&
   return place;
 }
 
-// Everything where the world has it, but for what the file says.
+// The poses as in the world, except those that the file gives.
 scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
   node.only({"world_from_prototype", "slots", "shown"});
   const scene::Scene& scene = *world->scene;
@@ -168,7 +168,7 @@ scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
       posed.parts.push_back(*found);
     } else {
       node.problem(fmt::format(
-          "expected slots.{}.world_from_part, for no marker of it stands in the world, found none.",
+          "expected slots.{}.world_from_part, because no marker of it is in the world, found none.",
           slot.name));
     }
   }
@@ -191,8 +191,8 @@ void coarsen(const ConfigNode& node, Rig* rig) {
   if (!done) node.problem(done.message());
 }
 
-// Those of the file, else of the scene. Of several the eye that they share, in an image like the first
-// one's.
+// Chooses the file's viewers, or else the scene's. Several are replaced by their shared viewpoint, with an
+// image like the first one's.
 Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
   const scene::Scene& scene = check->told.scene;
   std::vector<scene::Viewpoint> eyes = check->posed.viewpoints;
@@ -212,12 +212,15 @@ Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
     return {};
   }
   const Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
-  if (eyes.empty()) return error("viewer: expected one, for the scene has none in the world, found nothing.");
+  if (eyes.empty())
+    return error("viewer: expected one, because the scene has none in the world, found none.");
   const scene::SharedViewpoint shared =
       scene::updated_viewpoint({}, eyes, *scene::middle_of(scene, check->posed), 0);
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, check->posed, d_up_world);
   if (!viewer)
-    return error("viewer: expected viewers apart from the prototype, found their eye in its middle.");
+    return error(
+        "viewer: expected viewers at a distance from the prototype, found their shared viewpoint in its "
+        "middle.");
   check->viewer = *viewer;
   if (like) {
     const double half = 0.5 * like->width / like->lens.fx();
@@ -228,7 +231,7 @@ Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
   return {};
 }
 
-// Moves the light of a projector by so many of its pixels: what a push against it does.
+// Shifts the light of each named projector by a number of its pixels, as a push against it would.
 void nudge(const ConfigNode& node, Rig* rig) {
   for (const std::string& name : node.keys()) {
     Imager* projector = find_named(rig->projectors, name);
@@ -262,27 +265,30 @@ Hand read_hand(const ConfigNode& node, const Rig& rig) {
 
 const std::vector<CheckMeasure>& check_measures() {
   static const std::vector<CheckMeasure> measures = {
-      {"texture_mm", "surface light from where it was aimed, RMS", "mm"},
-      {"parallax_mm", "points 50 mm off the surface, seen from the eye, worst", "mm"},
-      {"shared_mm", "the same, seen by the viewers who share the eye, RMS", "mm"},
-      {"shone_mean_255", "light on the prototype against the ray tracer, mean of lit pixels", "/255"},
-      {"shone_over4_share", "light on the prototype, pixels more than 4/255 off", ""},
-      {"shone_inner_over4_share", "light on the prototype off edges, pixels more than 4/255 off", ""},
-      {"drawn_mean_255", "parts over a camera picture against the ray tracer, mean of their pixels", "/255"},
-      {"drawn_over4_share", "parts over a camera picture, pixels more than 4/255 off", ""},
-      {"drawn_inner_over4_share", "parts over a camera picture off edges, pixels more than 4/255 off", ""},
+      {"texture_mm", "distance of surface light from where it was aimed, RMS", "mm"},
+      {"parallax_mm", "points 50 mm off the surface, seen from the viewpoint, worst error", "mm"},
+      {"shared_mm", "the same points, seen by the viewers who share the viewpoint, RMS", "mm"},
+      {"shone_mean_255", "light on the prototype compared with the ray tracer, mean over lit pixels", "/255"},
+      {"shone_over4_share", "light on the prototype, share of pixels more than 4/255 off", ""},
+      {"shone_inner_over4_share",
+       "light on the prototype away from edges, share of pixels more than 4/255 off", ""},
+      {"drawn_mean_255", "parts over a camera image compared with the ray tracer, mean over their pixels",
+       "/255"},
+      {"drawn_over4_share", "parts over a camera image, share of pixels more than 4/255 off", ""},
+      {"drawn_inner_over4_share",
+       "parts over a camera image away from edges, share of pixels more than 4/255 off", ""},
       {"mask_iou", "on/off-surface masks, overlap with the ray tracer's (IoU)", "", true},
-      {"spill_share", "light on what no part asks for, of all light", ""},
-      {"composite_px", "outlines over a camera picture, RMS of the worst part", "px"},
-      {"edge_gap_share", "part's light missing where light meets screen, 95 %", ""},
-      {"edge_double_share", "part's light shown twice where light meets screen, 95 %", ""},
-      {"depth_order_share", "pixels with parts and prototype in the right order", "", true},
-      {"seam_step_p95", "luminance step along projectors' seams, 95 %", ""},
+      {"spill_share", "share of the light that falls where no part needs it", ""},
+      {"composite_px", "outlines over a camera image, RMS of the worst part", "px"},
+      {"edge_gap_share", "part's light missing where light meets screen, 95 % quantile", ""},
+      {"edge_double_share", "part's light shown twice where light meets screen, 95 % quantile", ""},
+      {"depth_order_share", "share of pixels with parts and prototype in the right order", "", true},
+      {"seam_step_p95", "luminance step along projectors' seams, 95 % quantile", ""},
       {"seam_step_max", "luminance step anywhere, largest", ""},
-      {"black_step_share", "step of the light of black, share of one projector's, worst", ""},
-      {"refill_share", "light lost to a hand's shadow that is back within 3 frames", "", true},
-      {"refill_flash_share", "light over what was there without the hand, worst", ""},
-      {"refill_still_255", "change of the projectors' pictures over 30 frames without a hand", "/255"},
+      {"black_step_share", "step of the black light, as a share of one projector's, worst", ""},
+      {"refill_share", "share of the light lost to a hand's shadow that is filled within 3 frames", "", true},
+      {"refill_flash_share", "light above that without the hand, as a share of it, worst", ""},
+      {"refill_still_255", "change of the projectors' images over 30 frames without a hand", "/255"},
       {"rerun_worst_255", "difference of two runs, worst", "/255"},
   };
   return measures;
@@ -311,7 +317,7 @@ Result<Check> load_check(const fs::path& path) {
   }
   if (!check.truth.scene || !check.truth.scene->prototype) {
     return error(
-        "{}: world: expected a world or a scene with a prototype to shine on, found none. Add scene.",
+        "{}: world: expected a world or a scene with a prototype to project on, found none. Add scene.",
         path.string());
   }
   LIMN_TRY(check.posed, poses_of(root.find("poses"), config.folder(), &check.truth));

@@ -14,12 +14,12 @@
 
 namespace limn::apps {
 
-/// What `limn check` can measure, by its name in a check file's `limits`.
+/// A measure of `limn check`; its name is the key in a check file's `limits`.
 struct CheckMeasure {
   std::string name;
-  std::string what;    ///< for people
-  std::string unit;    ///< empty: a share
-  bool least = false;  ///< the limit is the least that is good, else the most
+  std::string what;    ///< A description for people.
+  std::string unit;    ///< Empty for a share.
+  bool least = false;  ///< The limit is a minimum, not a maximum.
 };
 const std::vector<CheckMeasure>& check_measures();
 
@@ -28,29 +28,28 @@ struct CheckLimit {
   double value = 0;
 };
 
-/// What the renderer is told of a world.
+/// What the renderer knows of a world.
 struct RendererInput {
   Rig rig;
   scene::Scene scene;
   scene::PosedScene posed;
 };
 
-/// A check, ready to be judged: what is true, and what the renderer is told of it.
+/// A check that is ready to be measured: the true world, and what the renderer knows of it.
 struct Check {
-  std::string name;  ///< the file's stem
+  std::string name;  ///< The file's stem.
   std::string about;
   std::vector<CheckLimit> limits;
-  Imager viewer;                                      ///< whose eye view parts are drawn for
-  std::vector<scene::SharedViewpoint::Share> shares;  ///< of the viewers, where several share that eye
-  Hand hand;                                          ///< that shades in `refill_…`
+  Imager viewer;                                      ///< View parts are drawn for its viewpoint.
+  std::vector<scene::SharedViewpoint::Share> shares;  ///< Shares of the viewers in it; empty for one.
+  Hand hand;                                          ///< The hand that shades in `refill_…`.
 
-  sim::World truth;         ///< with the injected nudges
-  scene::PosedScene posed;  ///< where the parts truly are
-  RendererInput told;       ///< the same, but for the nudges
+  sim::World truth;         ///< The true world, with the injected nudges.
+  scene::PosedScene posed;  ///< The true poses of the parts.
+  RendererInput told;       ///< The same without the nudges.
 };
 
-/// Reads a check file (limn.check/1; config/README.md says its keys) with the world, scene and poses that it
-/// names.
+/// Reads a check file (limn.check/1, keys in config/README.md) with the world, scene and poses that it names.
 Result<Check> load_check(const std::filesystem::path& path);
 
 }  // namespace limn::apps

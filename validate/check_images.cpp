@@ -12,11 +12,12 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_over = 4;  // levels that a pixel may be off
-constexpr double k_edge = 8;  // levels between neighbours: beyond, samples of a pixel show, not its colour
+constexpr double k_over = 4;  // levels by which a pixel may be off
+constexpr double k_edge =
+    8;  // levels between neighbours; above it, the sampling of a pixel matters more than its colour
 constexpr double k_difference_gain = 32;  // 4/255 becomes 128
 
-// Pixels of an image (levels, CV_32FC3) around which it is nearly even.
+// Mask of the pixels of an image (levels, CV_32FC3) whose neighbourhood is nearly even.
 cv::Mat nearly_even(const cv::Mat& image) {
   const cv::Mat around = square_kernel(3);
   cv::Mat highest, lowest;
@@ -93,8 +94,8 @@ LevelErrors level_errors(const cv::Mat& off, const cv::Mat& expected, const cv::
 
 std::string level_errors_caption(const LevelErrors& errors, const cv::Mat& shown) {
   return fmt::format(
-      "{} pixels; mean {:.3f}/255; over 4/255: {:.3f} % of the picture, {:.3f} % of the parts off edges. "
-      "Difference: 32 times.",
+      "{} pixels; mean {:.3f}/255; over 4/255: {:.3f} % of the image, {:.3f} % of the parts away from edges. "
+      "Difference: amplified 32 times.",
       cv::countNonZero(shown), errors.mean, 100 * errors.over, 100 * errors.inner_over);
 }
 

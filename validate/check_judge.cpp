@@ -12,7 +12,7 @@ namespace limn::apps {
 namespace {
 
 struct Measures {
-  std::vector<std::string> names;  // as check_measures() has them
+  std::vector<std::string> names;  // names of check_measures()
   Status (*judge)(CheckRun& run);
 };
 

@@ -6,9 +6,9 @@
 
 namespace limn::apps {
 
-/// Draws what the check's limits ask for and measures it against the ray tracer; README.md says what each
-/// measure compares with what. A GL context must be current. Error: nothing to judge by a measure, such as no
-/// part in the image.
+/// Draws what the check's limits need and compares it with the ray tracer; README.md says what each measure
+/// compares. A GL context must be current. Error: a measure finds nothing to compare, such as no part in the
+/// image.
 Result<CheckResult> judged(const Check& check);
 
 }  // namespace limn::apps

@@ -5,8 +5,8 @@
 
 namespace limn::apps {
 
-/// Each judges some measures of a check (README.md says what is compared with what) and leaves their values
-/// and images in `run`. Error: there is nothing to measure, such as no part in the image.
+/// Each function computes some measures of a check (README.md says what they compare) and stores values and
+/// images in `run`. Error: there is nothing to measure, such as no part in the image.
 
 Status judge_texture(CheckRun& run);      ///< texture_mm
 Status judge_parallax(CheckRun& run);     ///< parallax_mm

@@ -80,8 +80,8 @@ Status write_check_page(std::span<const CheckResult> results,
   const auto failed = std::count_if(results.begin(), results.end(), [](const auto& r) { return !r.good(); });
   std::string html = fmt::format(
       "<h1>Limn checks: {}</h1>\n<p class=\"lead\">The images of the renderer ({}) are compared with those "
-      "of a ray "
-      "tracer that shares no code with it. The result that is closest to its limit comes first.</p>\n",
+      "of a ray tracer that shares no code with it. The result that is closest to its limit comes "
+      "first.</p>\n",
       failed == 0 ? fmt::format("all {} passed", results.size())
                   : fmt::format("{} of {} failed", failed, results.size()),
       escaped(renderer));

@@ -9,8 +9,8 @@
 
 namespace limn::apps {
 
-/// Writes one HTML file that needs no other: a table of all readings, the most strained limit first, then the
-/// checks with their images.
+/// Writes one HTML file that needs no other: a table of all readings, those that use most of their limit
+/// first, then the checks with their images.
 Status write_check_page(std::span<const CheckResult> results,
                         const std::string& renderer,
                         const std::filesystem::path& path);

@@ -8,18 +8,19 @@
 
 namespace limn::apps {
 
-/// A measure with its verdict.
+/// A measured value with its limit.
 struct CheckReading {
   CheckLimit limit;
   double value = 0;
   bool good() const { return limit.measure.least ? value >= limit.value : value <= limit.value; }
-  /// Share of the limit that is used up: above 1 it is missed. Orders readings of different measures.
+  /// The share of the limit that is used; above 1 the limit is missed. It orders readings of different
+  /// measures.
   double strain() const;
 };
 
-/// What was drawn, what it should be, and how they differ, for people to look at (8-bit BGR).
+/// What was drawn, what was expected, and the difference, for people (8-bit BGR).
 struct CheckImage {
-  std::string file;  ///< without -actual.png, -expected.png, -difference.png
+  std::string file;  ///< Without -actual.png, -expected.png, -difference.png.
   std::string title;
   std::string caption;
   cv::Mat actual, expected, difference;
@@ -28,10 +29,10 @@ struct CheckImage {
 struct CheckResult {
   std::string name;
   std::string about;
-  std::vector<CheckReading> readings;  ///< in the order of check_measures()
+  std::vector<CheckReading> readings;  ///< In the order of check_measures().
   std::vector<CheckImage> images;
   double seconds = 0;
-  std::string problem;  ///< why nothing was measured; empty: it was
+  std::string problem;  ///< Why nothing was measured; empty if there was no problem.
   bool good() const;
 };
 

@@ -17,44 +17,44 @@
 
 namespace limn::apps {
 
-/// One check while it is judged. What several measures need is made once, when it is first asked for.
+/// One check while it is measured. Data that several measures need is computed once, when it is first needed.
 class CheckRun {
  public:
-  /// `check` must stay as long as this is used.
+  /// `check` must outlive this object.
   explicit CheckRun(const Check& check);
-  /// Makes the renderer; a GL context must be current.
+  /// Creates the renderer; a GL context must be current.
   Status open();
 
   const Check& check() const { return check_; }
-  /// The stage that a renderer can answer for: the true rig and the bare, white prototype in the dark;
-  /// projectors with a gamma of 2.2 and none of the other effects.
+  /// The world reduced to what a renderer can be responsible for: the true rig and the bare, white prototype
+  /// in the dark; projectors with a gamma of 2.2 and none of the other effects.
   const sim::World& world() const { return world_; }
   projector::Renderer& renderer() { return *renderer_; }
   bool asks_for(const std::string& measure) const { return asked_.contains(measure); }
 
-  /// What this renderer draws for the projectors, for the check's viewer.
+  /// The projector images that this renderer draws for the check's viewer.
   std::vector<cv::Mat> drawn_by(projector::Renderer& renderer, const scene::PosedScene& posed) const;
-  /// What the projectors get of the check's parts.
+  /// The projector images of the check's parts.
   const std::vector<cv::Mat>& projector_images();
-  /// The scene's prototype with one part instead of the scene's own, and where that is.
+  /// The scene's prototype with this mesh as its only part, and the poses of both.
   std::pair<scene::Scene, scene::PosedScene> shown_instead(const scene::Mesh& mesh, scene::Mode mode) const;
-  /// That, drawn by a renderer of its own.
+  /// The projector images of shown_instead(), drawn by a renderer of its own.
   Result<std::vector<cv::Mat>> drawn_instead(const scene::Mesh& mesh, scene::Mode mode) const;
-  /// Even light over the whole prototype.
+  /// The prototype's mesh with a uniform material that emits even light.
   scene::Mesh coat() const;
 
-  /// The ray-traced images of the parts.
+  /// The ray tracer's renderer of the check's parts.
   sim::ReferenceRenderer reference() const { return {world_, check_.posed, check_.viewer}; }
-  /// Those of the projectors.
+  /// The ray-traced images of the projectors.
   const std::vector<sim::PartImage>& aims();
-  /// The viewer's eye.
+  /// The view from the viewpoint.
   const ReferenceView& eye();
-  /// The viewer's eye with k_finer x k_finer rays a pixel, for light that is to be even.
+  /// The same view with k_finer x k_finer rays per pixel, for measures of even light.
   const ReferenceView& fine_eye();
-  /// What each projector reaches of it.
+  /// The share of each pixel of fine_eye() that each projector reaches.
   const std::vector<cv::Mat>& fine_reaches();
 
-  /// Camera 0 as the renderer has it. Error: the world has none.
+  /// Camera 0 as the renderer knows it. Error: the world has none.
   Result<const Imager*> camera(const std::string& measure) const;
   /// The error of a measure that finds nothing to measure.
   Error nothing_to_judge(const std::string& measure, const std::string& expected) const;
@@ -62,7 +62,7 @@ class CheckRun {
   void set(const std::string& measure, double value) { values_[measure] = value; }
   double value(const std::string& measure) const { return values_.at(measure); }
   void add(CheckImage image) { images_.push_back(std::move(image)); }
-  /// All that was measured of what the check asks for.
+  /// The readings of everything that the check asks for.
   CheckResult result() &&;
 
  private:
@@ -78,9 +78,10 @@ class CheckRun {
   std::vector<CheckImage> images_;
 };
 
-constexpr double k_coat = 0.5;  // light of the coat; a whole display value to 0.1 % of light
-constexpr int k_finer = 2;  // rays a side of a viewer's pixel for even light: a ray sees a projector's pixel,
-                            // narrower than the viewer's, and would skip others
-constexpr float k_whole = 0.999F;  // of a viewer's pixel
+constexpr double k_coat = 0.5;  // light of the coat; within 0.1 % of what a whole display value gives
+// Rays per side of a viewer's pixel for even light. One ray sees only one projector pixel, which is smaller
+// than the viewer's pixel, and would skip others.
+constexpr int k_finer = 2;
+constexpr float k_whole = 0.999F;  // share of a viewer's pixel that counts as all of it
 
 }  // namespace limn::apps

@@ -14,9 +14,9 @@ namespace limn::apps {
 namespace {
 
 constexpr int k_edge_window = 5;        // viewer pixels: light and screen within 2 of each other meet
-constexpr int k_least_outline_px = 50;  // of a part's area; below, an outline says nothing
+constexpr int k_least_outline_px = 50;  // area of a part; a smaller part's outline says nothing
 
-// For each pixel the index of the part that the renderer shows, as sim::DepthOrder has it.
+// For each pixel the index of the part that the renderer shows in front, in the format of sim::DepthOrder.
 cv::Mat front_of(const std::vector<projector::PartCoverage>& coverage, const Imager& imager) {
   cv::Mat front(imager.height, imager.width, CV_16S, cv::Scalar(-1));
   for (std::size_t i = 0; i < coverage.size(); ++i)
@@ -24,7 +24,7 @@ cv::Mat front_of(const std::vector<projector::PartCoverage>& coverage, const Ima
   return front;
 }
 
-// Where at camera 0 light and screen meet within a part, away from the part's outline.
+// Where light and screen meet within a part at camera 0, away from the part's outline.
 cv::Mat light_meets_screen(CheckRun& run, const Imager& camera, const cv::Mat& cover) {
   const sim::Truth masks(run.world(), run.check().posed);
   const cv::Mat front = run.reference().depth_order(camera).front, near = square_kernel(k_edge_window),
@@ -51,7 +51,7 @@ Status judge_drawn(CheckRun& run) {
   const sim::PartImage seen = run.reference().parts_image(run.world().rig.cameras.front());
   const cv::Mat expected = eye_image(seen.light);
   const cv::Mat shown = any_channel_over(actual, 0) | (seen.cover > 0);
-  if (cv::countNonZero(shown) == 0) return run.nothing_to_judge("drawn_…", "a part in camera 0's picture");
+  if (cv::countNonZero(shown) == 0) return run.nothing_to_judge("drawn_…", "a part in camera 0's image");
   cv::Mat off, levels, expected_levels;
   cv::absdiff(actual, expected, off);
   off.convertTo(levels, CV_32F);
@@ -75,9 +75,9 @@ Status judge_mask(CheckRun& run) {
   for (std::size_t i = 0; i < run.check().posed.parts.size(); ++i)
     masks.part_mask(run.check().viewer, run.check().posed.parts[i].slot)
         .copyTo(truth, front == static_cast<int>(i));
-  if (cv::countNonZero(truth) == 0) return run.nothing_to_judge("mask_iou", "a part in the viewer's picture");
+  if (cv::countNonZero(truth) == 0) return run.nothing_to_judge("mask_iou", "a part in the viewer's image");
   run.set("mask_iou", label_iou(found, truth));
-  run.add({"mask", "On and off the surface, from the viewer's eye",
+  run.add({"mask", "On and off the surface, from the viewpoint",
            "White is projected, grey is left to the screen. Difference: red.", bgr_image(found),
            bgr_image(truth), label_difference(found, truth)});
   return {};
@@ -100,7 +100,7 @@ Status judge_composite(CheckRun& run) {
     caption += fmt::format(" {}: {:.3f} px.", run.check().posed.parts[i].slot, off_px);
     worst_px = std::max(worst_px, off_px);
   }
-  if (worst_px < 0) return run.nothing_to_judge("composite_px", "a part in camera 0's picture");
+  if (worst_px < 0) return run.nothing_to_judge("composite_px", "a part in camera 0's image");
   run.set("composite_px", worst_px);
   run.add({"composite", "Outlines at " + camera->name, caption + " Difference: red.",
            bgr_image(owner_shades(found)), bgr_image(owner_shades(truth)),
@@ -108,7 +108,7 @@ Status judge_composite(CheckRun& run) {
   return {};
 }
 
-// The camera looks at the light that is right for its own eye, and the screen adds the rest: together they
+// The projected light is drawn for the camera's own viewpoint, and the screen adds the rest: together they
 // should be the parts.
 Status judge_edge(CheckRun& run) {
   LIMN_TRY(const Imager* camera, run.camera("edge_…"));
@@ -116,8 +116,7 @@ Status judge_edge(CheckRun& run) {
   const sim::PartImage parts = run.reference().parts_image(true_camera);
   const cv::Mat meets = light_meets_screen(run, true_camera, parts.cover);
   if (cv::countNonZero(meets) == 0)
-    return run.nothing_to_judge("edge_…",
-                                "a part in camera 0's picture that is half on, half off the surface");
+    return run.nothing_to_judge("edge_…", "a part in camera 0's image that is half on, half off the surface");
   std::vector<cv::Mat> images;
   for (std::size_t i = 0; i < run.check().told.rig.projectors.size(); ++i)
     images.push_back(run.renderer().projector_image(i, run.check().told.posed, *camera));
@@ -131,13 +130,12 @@ Status judge_edge(CheckRun& run) {
   cv::Mat levels, shown = together / 4;
   cv::Mat(cv::max(gap, twice)).convertTo(levels, CV_8U, 255 / 0.5);
   bgr_image(levels).copyTo(shown, meets);
-  run.add(
-      {"edge", "Where light meets screen at " + camera->name,
-       fmt::format("{} pixels; 95 %: {:.1f} % of the light missing, {:.1f} % shown twice. Difference: there, "
-                   "up to white at 50 %.",
-                   cv::countNonZero(meets), 100 * run.value("edge_gap_share"),
-                   100 * run.value("edge_double_share")),
-       together, expected, shown});
+  run.add({"edge", "Where light meets screen at " + camera->name,
+           fmt::format("{} pixels; 95 % quantile: {:.1f} % of the light missing, {:.1f} % shown twice. "
+                       "Difference: at these pixels, white is 50 % or more.",
+                       cv::countNonZero(meets), 100 * run.value("edge_gap_share"),
+                       100 * run.value("edge_double_share")),
+           together, expected, shown});
   return {};
 }
 
@@ -147,8 +145,7 @@ Status judge_depth_order(CheckRun& run) {
   const sim::DepthOrder truth = run.reference().depth_order(run.world().rig.cameras.front());
   const int contested = cv::countNonZero(truth.contested);
   if (contested == 0)
-    return run.nothing_to_judge("depth_order_share",
-                                "a part before or behind something in camera 0's picture");
+    return run.nothing_to_judge("depth_order_share", "a part before or behind something in camera 0's image");
   run.set("depth_order_share", share_within(found == truth.front, truth.contested));
   cv::Mat actual = owner_shades(found), expected = owner_shades(truth.front);
   actual.setTo(30, truth.contested & (found < 0));

@@ -18,7 +18,7 @@ table { margin: 0 0 2.5rem; }
 )";
 
 std::string rows_html(const std::vector<DemoRow>& rows) {
-  const HtmlRow headings = {text_cell("measured"), text_cell("value"), text_cell("asked for")};
+  const HtmlRow headings = {text_cell("measured"), text_cell("value"), text_cell("limit")};
   std::vector<HtmlRow> cells;
   for (const DemoRow& row : rows) {
     const char* colour = row.limit.empty() ? "number" : row.good ? "number good" : "number bad";

@@ -9,22 +9,22 @@
 
 namespace limn::apps {
 
-/// A row of the demo's table: what was measured, the value, what is asked for.
+/// A row of the demo's table: what was measured, the value, the limit.
 struct DemoRow {
   std::string what;
   std::string value;
-  std::string limit;  ///< empty: no limit
+  std::string limit;  ///< Empty: no limit.
   bool good = true;
 };
 
 struct DemoImage {
-  std::string file;  ///< its name in the output folder, without .png
+  std::string file;  ///< Name in the output folder, without .png.
   std::string title;
   std::string caption;
-  cv::Mat image;  ///< 8-bit BGR or grey
+  cv::Mat image;  ///< 8-bit BGR or grey.
 };
 
-/// The demo's result as people look at it.
+/// The content of the demo's page.
 struct DemoPage {
   std::string headline;
   std::vector<DemoRow> rows;

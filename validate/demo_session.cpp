@@ -36,19 +36,19 @@ constexpr double k_viewer_fov_deg = 40;
 constexpr double k_turn_deg = 40;
 const Eigen::Vector3d k_move_m = Eigen::Vector3d(0.12, 0.08, 0.04).normalized() * 0.15;
 
-// What is asked of a first light (the numbers).
+// The limits of the first complete session.
 constexpr double k_max_registration_mm = 0.5;
 constexpr double k_max_composite_px = 1.0;
 constexpr double k_min_mask_iou = 0.97;
 constexpr double k_max_held_out_px = 0.40;
 
-// Where the designer stands, in the door's frame (x right, y up, z towards the onlooker): first behind the
+// Where the designer stands, in the door's frame (x right, y up, z towards the viewer): first behind the
 // camera, then two steps to the left.
 const Eigen::Vector3d k_p_eye(0.03, 0.32, 1.62);
 const Eigen::Vector3d k_p_eye_left(-0.75, 0.35, 1.15);
 const Eigen::Vector3d k_p_gaze(-0.04, 0.02, 0.0);
 
-// Seconds of each stage, in order.
+// The seconds that each step takes, in order.
 class Stages {
  public:
   template <class Work>
@@ -74,21 +74,21 @@ class Stages {
   std::vector<std::pair<std::string, double>> seconds_;
 };
 
-// What the session knows (never the truth), and the GL that it draws with.
+// What the session knows (never the ground truth), and the renderer that it draws with.
 struct Session {
   Rig rig;
-  double held_out_px;  // of its calibration
+  double held_out_px;  // held-out error of its calibration
   scene::Scene scene;
   std::vector<Body> bodies;
   tracker::Detector detector;
   projector::Renderer renderer;
 };
 
-// Where everything is at a moment, as the tracker sees it, and what is shown on it.
+// Where everything is at a moment according to the tracker, and what is shown there.
 struct Moment {
-  cv::Mat photograph;  // of the room without projected light
+  cv::Mat photograph;  // the room without projected light
   int markers = 0;
-  int false_markers = 0;  // of them, not in the room
+  int false_markers = 0;  // detected markers that are not in the room
   std::vector<Track> tracks;
   scene::PosedScene posed;
 };
@@ -104,7 +104,7 @@ Result<cv::Mat> photograph(sim::VirtualRig* room) {
   return frame.image;
 }
 
-// Photographs the room in its own light and finds everything in the image.
+// Photographs the room without projected light and finds everything in the image.
 Result<Moment> looked(Session* session, sim::VirtualRig* room, const std::vector<std::string>& variants) {
   room->darken();
   Moment moment;
@@ -139,7 +139,7 @@ std::vector<cv::Mat> drawn(projector::Renderer* renderer,
   return images;
 }
 
-// Photograph of the room with these images shone into it.
+// A photograph of the room while these images are projected.
 Result<cv::Mat> shone(sim::VirtualRig* room, const std::vector<cv::Mat>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     if (auto shown = room->projector(static_cast<int>(i)).show(images[i]); !shown) return shown.error();
@@ -147,14 +147,14 @@ Result<cv::Mat> shone(sim::VirtualRig* room, const std::vector<cv::Mat>& images)
   return photograph(room);
 }
 
-// What an eye sees of the room with these images shone into it: a simulated photograph from there.
+// The room from another viewpoint while these images are projected: a simulated photograph.
 cv::Mat seen_from(const sim::World& world, const Imager& eye, const std::vector<cv::Mat>& images) {
   sim::World seen = world;
   seen.rig.cameras = {eye};
   return sim::photograph(seen, sim::trace(seen, 0), images, world.seed);
 }
 
-// A renderer of the judge's dots instead of the scene's parts, on the same prototype.
+// A renderer of the aimed dots instead of the scene's parts, on the same prototype.
 Result<projector::Renderer> dots_renderer(const Session& session, const AimedDots& dots) {
   scene::Scene scene = session.scene;
   scene::Slot slot;
@@ -170,7 +170,7 @@ struct JudgedDots {
   Registration registration;
 };
 
-// The calibrated rig's light against the truth, with the door where the tracker says it is.
+// Compares the light of the calibrated rig with the ground truth, with the door where the tracker says it is.
 Result<JudgedDots> judged(const Session& session, const sim::World& world, const Moment& moment) {
   const AimedDots dots = aimed_dots(world, k_judged_points, k_judged_seed);
   LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
@@ -181,7 +181,7 @@ Result<JudgedDots> judged(const Session& session, const sim::World& world, const
   return JudgedDots{dots, judged_registration(world, dots, images)};
 }
 
-// Masks of all parts in one image; where they overlap the later slot's.
+// The masks of all parts in one image; where they overlap, the later slot's.
 cv::Mat merged_masks(const std::vector<projector::PartCoverage>& coverage, cv::Size size) {
   cv::Mat merged(size, CV_8U, cv::Scalar(0));
   for (const auto& part : coverage) part.mask.copyTo(merged, part.mask != 0);
@@ -197,7 +197,8 @@ cv::Mat merged_true_masks(const sim::Truth& truth, const scene::Scene& scene, co
   return merged;
 }
 
-// Outline of the first part in the camera's image against the ray-traced truth, at twice the resolution.
+// Distance of the first part's outline in the camera's image from the ray-traced one, at twice the
+// resolution.
 double composite_error_px(Session* session,
                           const sim::World& world,
                           const sim::Truth& truth,
@@ -210,7 +211,7 @@ double composite_error_px(Session* session,
   return outline_distance_px(coverage.at(0).mask, true_mask) / 2;
 }
 
-// The door with every judged dot in the colour of its error, over a photograph.
+// The door with every dot in the colour of its error, over a photograph.
 cv::Mat error_map(const cv::Mat& photograph, const sim::World& world, const JudgedDots& judged) {
   const auto& [dots, found] = judged;
   cv::Mat map = photograph / 3;
@@ -225,9 +226,9 @@ cv::Mat error_map(const cv::Mat& photograph, const sim::World& world, const Judg
   return map;
 }
 
-// One place of the door: where it truly is, what the tracker finds, how well the light then fits.
+// One place of the door: its true pose, what the tracker finds, and how well the light fits then.
 struct Place {
-  std::string name;  // in demo.json
+  std::string name;  // key in demo.json
   Moment moment;
   JudgedDots judged;
 };
@@ -244,7 +245,7 @@ Result<Place> judged_place(const std::string& name,
   return Place{name, std::move(moment), std::move(judged_dots)};
 }
 
-// The door in place, moved by 150 mm and turned by 40°.
+// The door in place, moved by 150 mm, and turned by 40°.
 std::vector<std::pair<std::string, Pose>> places_of(const Pose& world_from_prototype) {
   const Eigen::Vector3d d_up = Eigen::Vector3d::UnitZ();
   const Pose turn(exp_rotation(k_turn_deg * std::numbers::pi / 180 * d_up), Eigen::Vector3d::Zero());
@@ -254,7 +255,7 @@ std::vector<std::pair<std::string, Pose>> places_of(const Pose& world_from_proto
   return {{"in_place", world_from_prototype}, {"moved", moved}, {"turned", turned}};
 }
 
-// Captures, calibration and the session that they make possible.
+// Captures and calibrates, and sets up the session with the calibrated rig.
 Result<Session> calibrated(const fs::path& out, sim::VirtualRig* room, Stages* stages, bool keep_captures) {
   const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
   std::error_code ignored;
@@ -305,7 +306,7 @@ std::vector<DemoRow> rows_of(const Measurement& measured) {
     const Registration& found = place.judged.registration;
     at_most(fmt::format("registration {}, RMS of {} points", readable(place.name), found.points),
             found.rms_mm, "mm", k_max_registration_mm);
-    rows.push_back({fmt::format("registration {}, 95 %", readable(place.name)),
+    rows.push_back({fmt::format("registration {}, 95 % quantile", readable(place.name)),
                     fmt::format("{:.3f} mm", found.p95_mm), "", true});
   }
   int markers = 0, false_markers = 0;
@@ -341,7 +342,7 @@ nlohmann::ordered_json json_of(const Measurement& measured) {
   return json;
 }
 
-// What the renderer draws and the simulator photographs, for people to look at.
+// Images for people: what the renderer draws and what the simulator photographs.
 Result<std::vector<DemoImage>> shown_session(Session* session, sim::VirtualRig* room, const Place& place) {
   const scene::PosedScene& posed = place.moment.posed;
   const Pose& world_from_prototype = *posed.world_from_prototype;
@@ -354,7 +355,7 @@ Result<std::vector<DemoImage>> shown_session(Session* session, sim::VirtualRig* 
   const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
   LIMN_TRY(const Moment swapped, looked(session, room, {other_variant}));
   LIMN_TRY_STATUS(renderer.set_contact_shadow(&session->scene));
-  room->camera_effects(0).srgb = true;  // images for people; those that are measured in are linear
+  room->camera_effects(0).srgb = true;  // sRGB for people; measurements use linear images
   LIMN_TRY(const cv::Mat unlit, shone(room, {}));
   const auto images = drawn(&renderer, projector_count, posed, eye);
   LIMN_TRY(const cv::Mat lit, shone(room, images));
@@ -364,35 +365,40 @@ Result<std::vector<DemoImage>> shown_session(Session* session, sim::VirtualRig* 
 
   using projector::Composite;
   std::vector<DemoImage> shown = {
-      {"unlit", "The room, unlit", "A simulated photograph: a clay door, its markers, the room's own light.",
-       unlit},
-      {"lit", "Lit", "The same, with the projectors' light: trim line and mirror are painted on.", lit},
+      {"unlit", "The room without projected light",
+       "A simulated photograph: a clay door, its markers, the room's own light.", unlit},
+      {"lit", "Lit", "The same with the projectors' light: trim line and mirror are projected onto the door.",
+       lit},
       {"composite", "On the screen",
-       "Camera picture plus what light cannot show: the mirror's part beyond the door.",
+       "Camera image plus what light cannot show: the part of the mirror beyond the door.",
        renderer.composite(0, lit, posed, Composite::rest)},
-      {"composite-full", "The whole parts on the screen", "Drawn over the unlit photograph.",
+      {"composite-full", "The whole parts on the screen",
+       "Drawn over the photograph without projected light.",
        renderer.composite(0, unlit, posed, Composite::full)}};
   for (std::size_t i = 0; i < projector_count; ++i) {
     const std::string& name = session->rig.projectors[i].name;
-    shown.push_back({name, name, "What this projector gets.", images[i]});
+    shown.push_back({name, name, "The image for this projector.", images[i]});
   }
   shown.push_back(
       {"error-map", "Error map",
-       fmt::format("Each dot is aimed light, judged by the ray tracer: green 0, red {} mm or more.",
-                   k_max_registration_mm),
+       fmt::format(
+           "Each dot is projected light, measured by the ray tracer: green is 0, red is {} mm or more.",
+           k_max_registration_mm),
        error_map(unlit, room->world(), place.judged)});
-  shown.push_back({"composite-swapped", "Another mirror", "After a variant swap: light and screen follow.",
+  shown.push_back({"composite-swapped", "Another mirror",
+                   "After the variant was changed, light and screen show the new mirror.",
                    renderer.composite(0, lit_swapped, swapped.posed, Composite::rest)});
-  shown.push_back(
-      {"from-the-left", "From the left",
-       "The designer has walked to the left: the mirror is painted for that eye and stands off the door.",
-       seen_from(room->world(), true_eye_left, images_left)});
-  shown.push_back({"mask", "Mask", "From the designer's eye: white is projected, grey is left to the screen.",
+  shown.push_back({"from-the-left", "From the left",
+                   "The designer has walked to the left: the mirror is projected for the new viewpoint and "
+                   "seems to stand out from the door.",
+                   seen_from(room->world(), true_eye_left, images_left)});
+  shown.push_back({"mask", "Mask",
+                   "From the designer's viewpoint: white is projected, grey is left to the screen.",
                    merged_masks(renderer.coverage(posed, eye), {eye.width, eye.height})});
   return shown;
 }
 
-// Overlap of the designer's masks with the ray-traced ones.
+// Overlap of the masks from the designer's viewpoint with the ray-traced ones.
 double mask_iou(Session* session, const sim::World& world, const sim::Truth& truth, const Moment& moment) {
   const Imager eye = designers_eye(*moment.posed.world_from_prototype);
   const cv::Mat found = merged_masks(session->renderer.coverage(moment.posed, eye), {eye.width, eye.height});

@@ -9,16 +9,16 @@
 
 namespace limn::apps {
 
-/// What a demo measured, as people and as programs read it, and what it drew.
+/// What a demo measured, for people and for programs, and what it drew.
 struct DemoResult {
   std::vector<DemoRow> rows;
-  std::string json;  ///< demo.json
+  std::string json;  ///< The content of demo.json.
   std::vector<DemoImage> images;
 };
 
-/// A whole session on the virtual rig `studio`, judged against the simulator's truth: captures (in
-/// `out`/demo-captures, removed afterwards unless `keep_captures`), calibration (in `out`/rig), tracking,
-/// projection and composites. A GL context must be current.
+/// Plays a whole session on the virtual rig `studio` and compares it with the simulator's ground truth:
+/// captures (in `out`/demo-captures, removed afterwards unless `keep_captures`), calibration (in `out`/rig),
+/// tracking, projection and composites. A GL context must be current.
 Result<DemoResult> play_demo(const std::filesystem::path& out, bool keep_captures);
 
 }  // namespace limn::apps

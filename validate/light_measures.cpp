@@ -7,9 +7,10 @@
 namespace limn::apps {
 namespace {
 
-constexpr float k_same_reach = 0.02F;  // of a pixel: reached as far by two projectors
+constexpr float k_same_reach =
+    0.02F;  // share of a pixel: two projectors with a smaller difference reach it equally well
 
-// Between what any projector that reaches a pixel best would show alone.
+// The smallest and largest light that a projector would show alone, of those that reach a pixel best.
 std::pair<cv::Mat, cv::Mat> bounds_of_light(CheckRun& run) {
   cv::Mat low(run.check().viewer.height, run.check().viewer.width, CV_32FC3, cv::Scalar::all(0)),
       high = low.clone();
@@ -36,7 +37,7 @@ Status judge_shone(CheckRun& run) {
   const auto [low, high] = bounds_of_light(run);
   const cv::Mat lit = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
   if (cv::countNonZero(lit) == 0)
-    return run.nothing_to_judge("shone_…", "a part on the prototype in the viewer's picture");
+    return run.nothing_to_judge("shone_…", "a part on the prototype in the viewer's image");
   const cv::Mat below = low - actual, above = actual - high;
   cv::Mat off = cv::max(below, above);
   off = cv::max(off, 0.0);
@@ -45,7 +46,7 @@ Status judge_shone(CheckRun& run) {
   run.set("shone_mean_255", errors.mean);
   run.set("shone_over4_share", errors.over);
   run.set("shone_inner_over4_share", errors.inner_over);
-  run.add({"shone", "Light on the prototype, from the viewer's eye", level_errors_caption(errors, lit),
+  run.add({"shone", "Light on the prototype, from the viewpoint", level_errors_caption(errors, lit),
            eye_image(actual), eye_image(expected), amplified(off)});
   return {};
 }
@@ -61,7 +62,8 @@ Status judge_spill(CheckRun& run) {
     spilt += lost[0] + lost[1] + lost[2];
     const std::string& name = run.check().told.rig.projectors[i].name;
     run.add({"spill-" + name, "Light of " + name,
-             "Expected: alone, before light is shared. Difference: light on what no part asks for, 32 times.",
+             "Expected: this projector alone, before light is shared. Difference: light where no part needs "
+             "it, amplified 32 times.",
              eye_image(light), eye_image(run.aims()[i].light), amplified(forbidden)});
   }
   if (all == 0) return run.nothing_to_judge("spill_share", "light");

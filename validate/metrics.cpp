@@ -16,22 +16,22 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_dot_radius_m = 0.0018;       // some 4 projector pixels across: sub-pixel centroids
-constexpr double k_dot_spacing_m = 0.0075;      // discs and their light stay apart
-constexpr double k_floating_spacing_m = 0.012;  // a floating disc's light is drawn out by the surface's slant
-constexpr double k_free_radius_m = 0.0026;      // its light with the fringe of the pixels it is drawn in
+constexpr double k_dot_radius_m = 0.0018;       // about 4 projector pixels across, for sub-pixel centroids
+constexpr double k_dot_spacing_m = 0.0075;      // so that discs and their light do not touch
+constexpr double k_floating_spacing_m = 0.012;  // the surface's slant stretches a floating disc's light
+constexpr double k_free_radius_m = 0.0026;      // the disc's light with the fringe of its projector pixels
 constexpr double k_floating_free_radius_m = 0.0045;
-constexpr double k_min_sight_cosine =
-    0.6;  // between sight and surface behind a floating disc: so far it is drawn out
-constexpr double k_flat_m = 0.001;  // how far the surface may leave a dot's plane there
+// Cosine between line of sight and normal of the surface behind a floating disc; it limits the stretching.
+constexpr double k_min_sight_cosine = 0.6;
+constexpr double k_flat_m = 0.001;  // largest distance of the surface from a dot's plane there
 constexpr int k_dot_corners = 12;
-constexpr int k_tries_per_dot = 30;  // of random places, to pack dots as close as their spacing allows
-constexpr double k_border_px = 4;    // of a projector's image, that a dot must stay away from
+constexpr int k_tries_per_dot = 30;  // random points, to place dots as close as their spacing allows
+constexpr double k_border_px = 4;    // dots stay this far from the border of a projector's image
 constexpr double k_dot_lift_m = 0.0002;
-// 70 degrees: beyond, a dot is under two projector pixels wide and its centroid measures itself.
+// 70 degrees. At larger angles a dot is under two projector pixels wide and its centroid is not accurate.
 constexpr double k_min_incidence_cosine = 0.34;
 
-// Corners of a disc around a sample, in the tangent plane.
+// Points on the rim of a disc around a sample, in the tangent plane.
 std::vector<Eigen::Vector3d> rim(const sim::SampledPoint& sample, double radius_m) {
   const Eigen::Vector3d u = sample.n.unitOrthogonal(), v = sample.n.cross(u);
   std::vector<Eigen::Vector3d> corners;
@@ -48,7 +48,7 @@ bool well_inside(const Imager& projector, const Eigen::Vector3d& p_world) {
          px->x() < projector.width - 1 - k_border_px && px->y() < projector.height - 1 - k_border_px;
 }
 
-// Whether the true projector reaches the disc with some margin, from the front.
+// Whether the true projector reaches the disc from the front, with some margin.
 bool reached_by(const sim::World& world,
                 const sim::Truth& truth,
                 const Imager& projector,
@@ -78,13 +78,13 @@ bool reached(const sim::World& world,
                      [&](const Imager& p) { return reached_by(world, truth, p, sample, free_radius_m); });
 }
 
-// Grid of cells as wide as `spacing`, to find what is near.
+// A grid of cells with side `spacing`, for nearest-point queries.
 class NearestPoints {
  public:
   NearestPoints(const std::vector<Eigen::Vector3d>* points, double spacing)
       : points_(points), spacing_(spacing) {}
   void add(std::size_t index) { cells_[cell_of((*points_)[index])].push_back(index); }
-  // Index of the nearest point within the spacing, if any.
+  // Index of the nearest point within this distance, if any.
   std::optional<std::size_t> nearest(const Eigen::Vector3d& p, double within) const {
     std::optional<std::size_t> best;
     double best_distance = within;
@@ -119,7 +119,7 @@ const scene::Mesh& prototype_mesh(const sim::World& world) {
   return *prototype->mesh;
 }
 
-// Linear light of a display value by the true gamma.
+// Linear light of each display value by the true gamma.
 std::array<double, 256> light_of_values(double gamma) {
   std::array<double, 256> light{};
   for (std::size_t i = 0; i < light.size(); ++i) light[i] = std::pow(double(i) / 255, gamma);
@@ -147,7 +147,8 @@ AimedDots no_dots(double spacing_m) {
   return dots;
 }
 
-// Where on the prototype the viewer sees p (both in its frame), if on it.
+// The point of the prototype that the viewer sees in the direction of p (both in the prototype's frame), if
+// any.
 std::optional<sim::SampledPoint> seen_behind(const sim::World& world,
                                              const sim::Truth& truth,
                                              const Imager& viewer,
@@ -159,7 +160,8 @@ std::optional<sim::SampledPoint> seen_behind(const sim::World& world,
                            world.world_from_prototype.rotation.inverse() * landing->n_world};
 }
 
-// The place that counts for a dot when light lands at p: there, or where the eye sees it in the disc's plane.
+// The point that counts when light of a dot lands at p: p itself, or for floating discs p as seen from the
+// viewpoint in the disc's plane.
 Eigen::Vector3d place_of(const AimedDots& dots, std::size_t dot, const Eigen::Vector3d& p) {
   if (dots.p_centres.empty()) return p;
   const Eigen::Vector3d n = dots.p_eye - dots.p_centres[dot], d = p - dots.p_eye;
@@ -174,7 +176,7 @@ cv::Mat outline(const cv::Mat& mask) {
   return inside & ~eroded;
 }
 
-// Sum of squared distances from the pixels of one outline to the other, and their number.
+// Sum of the squared distances from the pixels of one outline to the other, and their number.
 std::pair<double, int> squared_distances(const cv::Mat& from, const cv::Mat& to) {
   cv::Mat distance;
   cv::distanceTransform(~to, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
@@ -234,7 +236,7 @@ Registration judged_registration(const sim::World& world,
                                  const AimedDots& dots,
                                  std::span<const cv::Mat> projector_images) {
   const sim::Truth truth(world);
-  const double reach_m = dots.spacing_m / 2;  // light nearer to a dot than this is the dot's
+  const double reach_m = dots.spacing_m / 2;  // light nearer to a dot than this belongs to the dot
   NearestPoints aimed(&dots.p_aimed, dots.spacing_m);
   for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) aimed.add(i);
   std::vector<double> energy(dots.p_aimed.size(), 0);

@@ -16,47 +16,47 @@ namespace limn::apps {
 
 /// Small white discs to be projected, each aimed at a point of the prototype's surface. Prototype frame.
 struct AimedDots {
-  scene::Mesh mesh;                      ///< unlit
-  std::vector<Eigen::Vector3d> p_aimed;  ///< where the middle of each disc's light is to land
-  double spacing_m = 0;                  ///< p_aimed are at least this far apart
+  scene::Mesh mesh;                      ///< The discs, unlit material.
+  std::vector<Eigen::Vector3d> p_aimed;  ///< Where the centre of each disc's light should land.
+  double spacing_m = 0;                  ///< Smallest distance between the points p_aimed.
 
-  // Of discs that float before the surface, else empty: their centres and the eye that sees each before its
-  // p_aimed.
+  // For discs that float in front of the surface, else empty: their centres, and the viewpoint from which
+  // each disc covers its p_aimed.
   std::vector<Eigen::Vector3d> p_centres;
   Eigen::Vector3d p_eye = Eigen::Vector3d::Zero();
 };
 
-/// About `count` random points on the prototype with a disc on each. Only points that some true projector
-/// reaches with its whole disc, well inside its image.
+/// About `count` random points on the prototype, each with a disc. Uses only points at which some true
+/// projector reaches the whole disc, well inside its image.
 AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed);
 
-/// About `count` discs that float `height_m` off random points of the prototype and face the viewer's eye,
-/// which sees them before points that some true projector reaches.
+/// About `count` discs that float `height_m` off random points of the prototype and face the viewpoint. Seen
+/// from there, each covers a point that some true projector reaches.
 AimedDots floating_dots(
     const sim::World& world, const Imager& viewer, double height_m, int count, std::uint64_t seed);
 
-/// How far light lands from where it was aimed: on the surface; of floating discs as the eye sees it, in each
-/// disc's plane.
+/// The distance of light from where it was aimed: on the surface, or for floating discs in each disc's plane
+/// as seen from the viewpoint.
 struct Registration {
   double rms_mm = 0;
   double p95_mm = 0;
   int points = 0;
-  int unlit = 0;  ///< of them, dots that got no light: counted with the largest distance looked at
-  std::vector<double> errors_mm;  ///< per dot
+  int unlit = 0;  ///< Dots without any light, also counted in `points`; their error is the search radius.
+  std::vector<double> errors_mm;  ///< One for each dot.
 };
 
-/// Shines the projectors' 8-bit images (true gamma) through the true rig onto the true prototype, pixel by
-/// pixel, and compares the centroid of each dot's light with the point it was aimed at.
+/// Projects the 8-bit images (true gamma) through the true rig onto the true prototype, pixel by pixel, and
+/// compares the centroid of each dot's light with the point that it was aimed at.
 Registration judged_registration(const sim::World& world,
                                  const AimedDots& dots,
                                  std::span<const cv::Mat> projector_images);
 
-/// RMS distance in pixels between the outlines of two masks (non-zero is inside), both ways; outlines along
-/// the image's border do not count. Infinite when one of them is empty.
+/// RMS distance in pixels between the outlines of two masks (non-zero is inside), in both directions.
+/// Outlines along the image's border do not count. Infinite when a mask is empty.
 double outline_distance_px(const cv::Mat& found, const cv::Mat& truth);
 
-/// Intersection over union of two labelled images: pixels where both have the same label other than 0, over
-/// pixels where either has one.
+/// Intersection over union of two labelled images: the number of pixels where both have the same label other
+/// than 0, divided by the number of pixels where either has a label.
 double label_iou(const cv::Mat& found, const cv::Mat& truth);
 
 /// The largest difference of any level between two series of 8-bit images; infinite when their number or

@@ -10,25 +10,25 @@
 
 namespace limn::apps {
 
-/// The mean of each factor x factor pixels.
+/// The mean of each block of factor x factor pixels.
 cv::Mat binned(const cv::Mat& fine, int factor);
 
-/// A viewer's eye in a virtual room, ray traced: the light that it sees of what projectors shine.
+/// The ray-traced view from a viewpoint in a virtual room: the projected light that is visible there.
 struct ReferenceView {
-  int finer;  ///< rays a side of a pixel
+  int finer;  ///< Rays per side of a pixel.
   sim::World world;
   sim::Samples samples;
 
-  /// `viewer` stands in the world frame and takes the place of the stage's cameras.
+  /// `viewer` is in the world frame and replaces the cameras of `stage`.
   ReferenceView(const sim::World& stage, const Imager& viewer, int rays);
 
-  /// With these images shone by the projectors as `projectors` has them: linear light, CV_32FC3, of the
-  /// viewer's size. An empty image is no light.
+  /// What is visible when these images are projected by the projectors of the world `projectors`: linear
+  /// light, CV_32FC3, of the viewer's size. An empty image gives no light.
   cv::Mat seen(const sim::World& projectors, const std::vector<cv::Mat>& shown) const;
   cv::Mat seen(const std::vector<cv::Mat>& shown) const { return seen(world, shown); }
-  /// With the image of one projector alone.
+  /// What is visible when only this projector shows its image.
   cv::Mat seen(std::size_t projector, const cv::Mat& shown) const;
-  /// Share of each of the viewer's pixels that each projector reaches, CV_32FC1.
+  /// For each projector, the share of each of the viewer's pixels that it reaches, CV_32FC1.
   std::vector<cv::Mat> reaches() const;
 };
 

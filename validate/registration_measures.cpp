@@ -38,8 +38,9 @@ void add_dots(CheckRun& run,
     cv::circle(difference, at, 4, cv::Scalar(colour[2], colour[1], colour[0]), cv::FILLED, cv::LINE_AA);
   }
   run.add({file, title,
-           fmt::format("{} discs; RMS {:.3f} mm, 95 % {:.3f} mm, unlit {}.{} Difference: red is {:.3f} mm.",
-                       found.points, found.rms_mm, found.p95_mm, found.unlit, remark, worst_mm),
+           fmt::format(
+               "{} discs; RMS {:.3f} mm, 95 % quantile {:.3f} mm, unlit {}.{} Difference: red is {:.3f} mm.",
+               found.points, found.rms_mm, found.p95_mm, found.unlit, remark, worst_mm),
            actual, expected, difference});
 }
 
@@ -56,7 +57,7 @@ void add_dots(CheckRun& run,
 
 Status judge_texture(CheckRun& run) {
   const AimedDots dots = aimed_dots(run.world(), k_dot_count, k_dot_seed);
-  if (dots.p_aimed.empty()) return run.nothing_to_judge("texture_mm", "a place that a projector reaches");
+  if (dots.p_aimed.empty()) return run.nothing_to_judge("texture_mm", "a point that a projector reaches");
   LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::surface));
   const Registration found = judged_registration(run.world(), dots, images);
   run.set("texture_mm", found.rms_mm);
@@ -68,7 +69,7 @@ Status judge_parallax(CheckRun& run) {
   const AimedDots dots =
       floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
   if (dots.p_aimed.empty())
-    return run.nothing_to_judge("parallax_mm", "a place before which the eye sees a disc");
+    return run.nothing_to_judge("parallax_mm", "a point in front of which a disc is visible");
   LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::view));
   const Registration found = judged_registration(run.world(), dots, images);
   run.set("parallax_mm", *std::max_element(found.errors_mm.begin(), found.errors_mm.end()));
@@ -76,12 +77,13 @@ Status judge_parallax(CheckRun& run) {
   return {};
 }
 
-// The image is the first viewer's.
+// The image is drawn for the first viewer.
 Status judge_shared(CheckRun& run) {
   if (run.check().shares.empty()) return run.nothing_to_judge("shared_mm", "several viewers");
   AimedDots dots = floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
   if (dots.p_aimed.empty())
-    return run.nothing_to_judge("shared_mm", "a place before which the shared eye sees a disc");
+    return run.nothing_to_judge("shared_mm",
+                                "a point in front of which a disc is visible from the shared viewpoint");
   LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::view));
   std::optional<Registration> first;
   std::string shares;
@@ -90,8 +92,8 @@ Status judge_shared(CheckRun& run) {
   for (const scene::SharedViewpoint::Share& share : run.check().shares) {
     dots.p_eye = run.world().world_from_prototype.inverse() * share.p_world;
     const Registration found = judged_registration(run.world(), dots, images);
-    shares += fmt::format(" {}: {:.0f} % of the eye, RMS {:.1f} mm.", share.viewer, 100 * share.share,
-                          found.rms_mm);
+    shares += fmt::format(" {}: {:.0f} % of the shared viewpoint, RMS {:.1f} mm.", share.viewer,
+                          100 * share.share, found.rms_mm);
     if (!first) first = found;
     if (share.share <= 0) continue;
     squares += found.rms_mm * found.rms_mm;

@@ -14,18 +14,19 @@
 namespace limn::apps {
 namespace {
 
-constexpr int k_seam_window = 9;  // viewer pixels within which a step is looked for
-constexpr double k_min_incidence_cosine =
-    0.34;                       // 70 degrees: beyond, a projector's pixel is drawn out threefold
-constexpr int k_light_end = 9;  // viewer pixels: where light ends within 4, it fades over the last projector
-                                // pixel, at 70 degrees some 3 viewer pixels wide, and the eye's blur
+constexpr int k_seam_window = 9;  // viewer pixels, the window of a step
+// 70 degrees. At larger angles a projector's pixel is stretched threefold.
+constexpr double k_min_incidence_cosine = 0.34;
+// Viewer pixels. Within 4 of where light ends it fades: over the last projector pixel, about 3 viewer pixels
+// wide at 70 degrees, and the viewer's blur.
+constexpr int k_light_end = 9;
 
 Eigen::Vector3f p_projector(const CheckRun& run, std::size_t i) {
   return run.world().rig.projectors[i].imager_from_world.inverse().translation.cast<float>();
 }
 
-// The light of one projector's black in the viewer's pixels, the mean of all as if each reached all that
-// faces it (CV_32FC3).
+// The mean light of the projectors' black in the viewer's pixels, as if each projector reached everything
+// that faces it (CV_32FC3).
 cv::Mat mean_black(CheckRun& run, const sim::World& glowing) {
   const sim::Samples& samples = run.fine_eye().samples;
   cv::Mat light(samples.height, samples.width, CV_32FC3, cv::Scalar::all(0));
@@ -44,7 +45,7 @@ cv::Mat mean_black(CheckRun& run, const sim::World& glowing) {
   return binned(light, k_finer);
 }
 
-// As limn solve would measure it.
+// The response as limn solve would measure it.
 ProjectorResponse measured_response(const sim::ProjectorEffects& effects, const std::string& projector) {
   ProjectorResponse response;
   response.projector = projector;
@@ -55,8 +56,8 @@ ProjectorResponse measured_response(const sim::ProjectorEffects& effects, const 
   return response;
 }
 
-// Pixels that the projectors can light evenly: one of them reaches the whole pixel at no grazing angle,
-// away from where all light ends.
+// Mask of the pixels that the projectors can light evenly: one of them reaches the whole pixel at no grazing
+// angle, away from where all light ends.
 cv::Mat evenly_lit(CheckRun& run) {
   const sim::Samples& samples = run.fine_eye().samples;
   cv::Mat lit(run.check().viewer.height, run.check().viewer.width, CV_8U, cv::Scalar(0));
@@ -72,8 +73,8 @@ cv::Mat evenly_lit(CheckRun& run) {
   return lit;
 }
 
-// How far luminance varies around each pixel as a share of `unit`, over `whole`; and where other projectors
-// begin.
+// The variation of luminance around each pixel of `whole` as a share of `unit`, and the lines where another
+// set of projectors begins.
 struct Steps {
   cv::Mat step;   // CV_32F
   cv::Mat along;  // CV_8U
@@ -126,22 +127,21 @@ Status judge_seams(CheckRun& run) {
   const cv::Mat whole = evenly_lit(run);
   const Steps steps = steps_of(run, actual, k_coat, whole);
   if (cv::countNonZero(steps.along) == 0)
-    return run.nothing_to_judge("seam_step_…", "a seam of projectors in the viewer's picture");
+    return run.nothing_to_judge("seam_step_…", "a seam of projectors in the viewer's image");
   run.set("seam_step_p95", steps.p95_along);
   run.set("seam_step_max", steps.worst);
   cv::Mat expected(actual.size(), CV_32FC3, cv::Scalar::all(0));
   expected.setTo(cv::Scalar::all(k_coat), whole);
-  run.add(
-      {"seam", "An even coat of light, from the viewer's eye",
-       fmt::format("Steps along seams: 95 % {:.2f} %; worst anywhere {:.2f} %. Difference: the seams blue, "
-                   "steps up to white at 8 %.",
-                   100 * steps.p95_along, 100 * steps.worst),
-       eye_image(actual), eye_image(expected), shown_steps(steps, 0.08)});
+  run.add({"seam", "An even coat of light, from the viewpoint",
+           fmt::format("Steps along seams: 95 % quantile {:.2f} %; worst anywhere {:.2f} %. Difference: "
+                       "seams are blue, white is a step of 8 % or more.",
+                       100 * steps.p95_along, 100 * steps.worst),
+           eye_image(actual), eye_image(expected), shown_steps(steps, 0.08)});
   return {};
 }
 
-// Where nothing is to be shown all projectors are on: their blacks add up. Distance and incidence count,
-// for they decide how much black arrives.
+// Where nothing is shown, all projectors show black and their light adds up. Distance and incidence are
+// simulated, because they decide how much black light arrives.
 Status judge_black(CheckRun& run) {
   sim::World glowing = run.fine_eye().world;
   Rig rig = run.check().told.rig;
@@ -161,18 +161,16 @@ Status judge_black(CheckRun& run) {
   const cv::Mat actual = run.fine_eye().seen(glowing, images);
   const Steps steps = steps_of(run, actual / one_black, 1, whole);
   if (cv::countNonZero(steps.along) == 0)
-    return run.nothing_to_judge("black_step_share", "a seam of projectors in the viewer's picture");
+    return run.nothing_to_judge("black_step_share", "a seam of projectors in the viewer's image");
   run.set("black_step_share", steps.worst_along);
-  const double brightness = 0.1 / brightest;  // for the eye
+  const double brightness = 0.1 / brightest;  // bright enough for people
   cv::Mat even = one_black * static_cast<double>(run.fine_reaches().size());
   even.setTo(0, ~whole);
-  run.add(
-      {"black", "The light of black, brightened",
-       fmt::format(
-           "Steps along seams: 95 % {:.1f} %, worst {:.1f} % of a projector's black. Difference: the seams "
-           "blue, steps up to white at 40 %.",
-           100 * steps.p95_along, 100 * steps.worst_along),
-       eye_image(actual * brightness), eye_image(even * brightness), shown_steps(steps, 0.4)});
+  run.add({"black", "The light of black, brightened",
+           fmt::format("Steps along seams: 95 % quantile {:.1f} %, worst {:.1f} % of one projector's black. "
+                       "Difference: seams are blue, white is a step of 40 % or more.",
+                       100 * steps.p95_along, 100 * steps.worst_along),
+           eye_image(actual * brightness), eye_image(even * brightness), shown_steps(steps, 0.4)});
   return {};
 }
 

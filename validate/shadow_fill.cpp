@@ -14,20 +14,22 @@
 namespace limn::apps {
 namespace {
 
-constexpr double k_period_s = 1 / 30.0;  // from one frame's light to the next one's
-constexpr int k_dark_frames = 2;         // at first: a session begins without parts
+constexpr double k_period_s = 1 / 30.0;  // between the light of two frames
+constexpr int k_dark_frames = 2;         // at the start, because a session begins without parts
 constexpr int k_still_frames = 30;
 constexpr int k_stay_frames = 6, k_move_frames = 5, k_gone_frames = 6;
-constexpr int k_allowed_frames = 3;    // from a shadow to light
-constexpr float k_least_loss = 0.05F;  // of a pixel's light: below, it is not in the shadow
-constexpr int k_least_pixels = 100;    // of a shadow
-constexpr int k_blur_px = 5;           // of the viewer's image, over which light is the same
-constexpr int k_light_end = 9;         // pixels: nearer to its end light fades over a projector's last pixel
-constexpr float k_least_light = 0.1F;  // of the brightest: below, nobody sees a flash
-constexpr float k_edge = 0.1F;  // of the light between neighbours: beyond, another projector's pixels show
+constexpr int k_allowed_frames = 3;    // from the start of a shadow until it must be filled
+constexpr float k_least_loss = 0.05F;  // share of a pixel's light; a smaller loss is not a shadow
+constexpr int k_least_pixels = 100;    // smallest number of pixels of a shadow
+constexpr int k_blur_px = 5;           // pixels of the viewer's image over which light is averaged
+constexpr int k_light_end = 9;         // pixels; nearer to its end, light fades over a projector's last pixel
+constexpr float k_least_light =
+    0.1F;  // share of the brightest light; flashes on darker pixels are not visible
+constexpr float k_edge =
+    0.1F;  // share of the light between neighbours; above it, differences between projectors' pixels show
 constexpr double k_skin_bgr[] = {0.28, 0.40, 0.62};
 
-// As limn solve would measure them.
+// Adds the responses as limn solve would measure them.
 void add_responses(const sim::World& world, Rig* rig) {
   for (std::size_t i = 0; i < rig->projectors.size(); ++i) {
     const sim::ProjectorEffects& effects = world.projector_effects[i];
@@ -57,7 +59,7 @@ sim::Object hand_object(const Pose& world_from_hand, double width_m, double heig
   return object;
 }
 
-// What a camera or the viewer's eye sees of the world with the hand somewhere, or without.
+// The world with the hand at some position, or without it, as traced for the cameras and the viewpoint.
 struct Traced {
   std::vector<sim::Samples> cameras;
   sim::Samples eye;
@@ -109,7 +111,7 @@ class Session {
   }
 
  private:
-  // The hand so far along its way, across the light and upwards.
+  // The pose of the hand after it moved this far, across the light and upwards.
   Pose world_from_hand(double moved_m) const {
     const Imager& projector = world_.rig.projectors[hand_.projector];
     const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
@@ -134,8 +136,8 @@ class Session {
     return out;
   }
 
-  // The frame loop's steps around what is shown, with every camera's frame of it: shadows are found as in a
-  // session.
+  // Does what the frame loop does after showing an image: every camera takes a frame of it, and shadows are
+  // detected as in a session.
   void monitor(const Traced& traced) {
     const Stamp at = shifted(Stamp{}, static_cast<double>(frames_ + 1) * k_period_s);
     history_.add(shown_, at);
@@ -153,7 +155,7 @@ class Session {
       shown_.push_back(renderer_->projector_image(i, posed_, viewer_));
   }
 
-  // The projectors' light on the prototype as the eye sees it; 0 elsewhere.
+  // The projectors' light on the prototype as seen from the viewpoint; 0 elsewhere.
   cv::Mat light(const Traced& traced, const std::vector<cv::Mat>& shown) const {
     sim::World eye = world_;
     eye.rig.cameras = {viewer_};
@@ -163,7 +165,7 @@ class Session {
     return out;
   }
 
-  // Pixels that see the prototype and nothing else.
+  // Mask of the pixels that see the prototype and nothing else.
   cv::Mat whole(const sim::Samples& samples) const {
     cv::Mat out(samples.height, samples.width, CV_8U, cv::Scalar(255));
     for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -175,9 +177,9 @@ class Session {
     return out;
   }
 
-  // Light of the pixels, and where it is lost though others can give it.
+  // The light of the pixels, and where light is lost that other projectors can give.
   struct Loss {
-    cv::Mat wanted, without;  // CV_32F: without a hand; with it and nobody to help
+    cv::Mat wanted, without;  // CV_32F: without a hand; with it, without shadow fill
     cv::Mat where;
   };
   Loss loss(const Traced& traced) const {
@@ -200,7 +202,8 @@ class Session {
     return out;
   }
 
-  // Over some pixels: another projector's have other places and are more or less sharp.
+  // Averages over some pixels, because another projector's pixels are at other positions and more or less
+  // sharp.
   static cv::Mat blurred(const cv::Mat& grey) {
     cv::Mat out;
     cv::blur(grey, out, {k_blur_px, k_blur_px});
@@ -211,12 +214,12 @@ class Session {
     const int lost = cv::countNonZero(loss(traced).where);
     if (lost >= k_least_pixels) return {};
     return error(
-        "refill: expected a hand whose shadow others can light from the viewer's eye, found {} such pixels. "
-        "Move the hand.",
+        "refill: expected a hand whose shadow, as seen by the viewer, other projectors can light, found {} "
+        "such pixels. Move the hand.",
         lost);
   }
 
-  // A frame with these things in their places: judged as it is, then seen by the cameras.
+  // One frame with the hand as traced: measures what is shown, then lets the cameras see it.
   void step(const Traced& traced, const std::string& phase, ShadowFillReading* reading) {
     const cv::Mat actual = light(traced, shown_);
     const Loss lost = loss(traced);
@@ -241,7 +244,7 @@ class Session {
     return all > 0 ? cv::mean(back, where)[0] / all : 1;
   }
 
-  // Over what was there without the hand, away from edges, and from where all light ends.
+  // The largest light above that without the hand, away from edges and from where all light ends.
   double flash(const Traced& traced, const cv::Mat& actual) const {
     cv::Mat wanted = blurred(grey(before_)), found = blurred(grey(actual)), highest, lowest, where;
     const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {k_light_end, k_light_end});
@@ -271,7 +274,7 @@ class Session {
   std::optional<ShadowWatch> shadows_;
   std::vector<cv::Mat> shown_, first_;
   cv::Mat before_;
-  cv::Mat since_;  // CV_32S: frames that a pixel has been in the shadow
+  cv::Mat since_;  // CV_32S: number of frames that each pixel has been in the shadow
 };
 
 }  // namespace

@@ -10,7 +10,7 @@
 
 namespace limn::apps {
 
-// In the world as it is, room, noise and all.
+// Uses the true world with its room and noise.
 Status judge_refill(CheckRun& run) {
   const auto [scene, posed] = run.check().told.posed.parts.empty()
                                   ? run.shown_instead(run.coat(), scene::Mode::surface)
@@ -24,9 +24,9 @@ Status judge_refill(CheckRun& run) {
   std::string shares;
   for (const ShadowFillFrame& frame : reading->frames)
     shares += fmt::format("{} {} {:.0f} %", shares.empty() ? "" : ",", frame.phase, 100 * frame.share);
-  run.add({"refill", "Light with a hand before a projector",
-           fmt::format("Expected: without the hand. Back of what the shadow takes, frame by frame:{}. "
-                       "Brighter by {:.1f} % at most. Difference: 32 times.",
+  run.add({"refill", "Light with a hand in front of a projector",
+           fmt::format("Expected: without the hand. Share of the shadow that is filled, frame by frame:{}. "
+                       "Brighter by {:.1f} % at most. Difference: amplified 32 times.",
                        shares, 100 * reading->flash),
            eye_image(reading->refilled), eye_image(reading->before),
            amplified(cv::abs(reading->refilled - reading->before))});

@@ -17,19 +17,19 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "STL is little-endian");
 
-constexpr double k_steepest_view = 75 * std::numbers::pi / 180;  // off the marker's axis
-constexpr double k_layer = 0.2;                                  // mm that printers build by
+constexpr double k_steepest_view = 75 * std::numbers::pi / 180;  // from the marker's axis
+constexpr double k_layer = 0.2;                                  // mm, layer height of printers
 constexpr double k_highest_guide = 1;                            // mm
 constexpr double k_guide_width = 2;                              // mm: five lines of a 0.4 mm nozzle
 constexpr double k_play = 0.15;                                  // mm between paper and guide
-constexpr double k_chamfer = 0.8;                                // mm, 45 degrees: the first layer's bulge
-constexpr double k_cover = 1.2;                                  // mm of plate left over the bore
+constexpr double k_chamfer = 0.8;  // mm, at 45 degrees: room for the bulge of the first layer
+constexpr double k_cover = 1.2;    // mm of plate above the bore
 constexpr int k_bore_sides = 32;
 constexpr double k_smallest = 3, k_largest = 152;  // mm: what `limn markers` prints on A4
 
 using Loop = std::vector<std::uint32_t>;  // points in order, counter-clockwise from above
 
-// Gathers points by place, so that faces that meet share them.
+// Collects points by position, so that adjacent faces share them.
 class Solid {
  public:
   std::uint32_t point(double x, double y, double z) {
@@ -44,7 +44,7 @@ class Solid {
     triangle(a, b, c);
     triangle(a, c, d);
   }
-  // Wall from a loop up to one of as many points, seen from outside the loop.
+  // A wall from a loop up to another with equally many points, seen from outside the loop.
   void wall(const Loop& low, const Loop& high) {
     for (std::size_t i = 0; i < low.size(); ++i) {
       const std::size_t next = (i + 1) % low.size();
@@ -59,7 +59,7 @@ class Solid {
   std::map<std::array<float, 3>, std::uint32_t> known_;
 };
 
-// Face and guides: a grid of cells of two heights.
+// Face and guides: a grid of cells with two heights.
 class Top {
  public:
   Top(const Mount& mount, Solid* solid) : mount_(mount), solid_(*solid) {
@@ -83,8 +83,8 @@ class Top {
  private:
   static constexpr int k_cells = 6;
 
-  // Columns count to the right, rows up. Arms fill cells 1 and 2, and cell 4; the one along the top from the
-  // left only cell 1.
+  // Columns count to the right, rows upwards. Arms fill cells 1 and 2, and cell 4; the arm along the top from
+  // the left fills only cell 1.
   static bool is_guide(int col, int row) {
     if (col < 0 || row < 0 || col >= k_cells || row >= k_cells) return false;
     const bool on_edge = col == 0 || row == 0 || col == k_cells - 1 || row == k_cells - 1;
@@ -111,8 +111,8 @@ class Top {
   std::array<double, 7> lines_;
 };
 
-// The plate's outline at a height, through every line of the top, begun at the corner (-, -). `inset` moves
-// the outline inwards.
+// The plate's outline at a height, with a point on every line of the top, beginning at the corner (-, -).
+// `inset` moves the outline inwards.
 Loop outline(const std::array<double, 7>& lines, double inset, double z, Solid* solid) {
   const double reach = lines.back() - inset;
   const auto along = [&](std::size_t i) { return std::clamp(lines[i], -reach, reach); };
@@ -124,7 +124,7 @@ Loop outline(const std::array<double, 7>& lines, double inset, double z, Solid* 
   return loop;
 }
 
-// Likewise the bore's, begun on the same diagonal.
+// The bore's outline, beginning on the same diagonal.
 Loop circle(double radius, double z, Solid* solid) {
   Loop loop;
   for (int i = 0; i < k_bore_sides; ++i) {
@@ -134,7 +134,7 @@ Loop circle(double radius, double z, Solid* solid) {
   return loop;
 }
 
-// The back between its outline and the bore, seen from below: both loops are walked by angle.
+// The back between its outline and the bore, seen from below: both loops are followed by angle.
 void build_back(const Loop& outer, const Loop& inner, Solid* solid) {
   const auto angle = [&](const Loop& loop, std::size_t i) {
     if (i == loop.size()) return 2 * std::numbers::pi;
@@ -157,7 +157,7 @@ void build_back(const Loop& outer, const Loop& inner, Solid* solid) {
   }
 }
 
-// A blind bore whose end is a cone of 45 degrees, which prints without support.
+// A blind bore that ends in a cone of 45 degrees, which prints without support.
 void build_bore(const Mount& mount, const Loop& mouth, Solid* solid) {
   const double radius = 0.5 * mount.socket_mm;
   const Loop end = circle(radius, mount.socket_depth_mm, solid);
@@ -189,7 +189,7 @@ Status write_stl(const Mount& mount, const std::filesystem::path& path) {
   return write_file(path, bytes);
 }
 
-// Numbers of the drawing to a thousandth, so that files read well.
+// Rounds to a thousandth, so that files are easy to read.
 double rounded(double mm) { return std::round(mm * 1000) / 1000; }
 
 }  // namespace
@@ -201,7 +201,7 @@ Mount marker_mount(const MountOptions& options) {
   const double hidden_margin = 0.5 * options.margin_mm;
   mount.guide_mm =
       std::min(k_highest_guide, k_layer * std::floor(hidden_margin / std::tan(k_steepest_view) / k_layer));
-  mount.socket_mm = mount.paper_side_mm >= 30 ? 6.2 : 3.2;  // rods of 6 and 3 mm
+  mount.socket_mm = mount.paper_side_mm >= 30 ? 6.2 : 3.2;  // for rods of 6 and 3 mm
   mount.socket_depth_mm = mount.socket_mm;
   mount.plate_mm =
       std::max(mount.paper_side_mm / 20, mount.socket_depth_mm + 0.5 * mount.socket_mm + k_cover);
@@ -217,15 +217,16 @@ Mount marker_mount(const MountOptions& options) {
   build_bore(mount, mouth, &solid);
   mount.points_mm = std::move(solid.points);
   mount.triangles = std::move(solid.triangles);
-  const Eigen::Quaterniond half_turn(0, 1, 0, 0);  // about x: marker's y down and z into the paper
+  const Eigen::Quaterniond half_turn(0, 1, 0,
+                                     0);  // about x: the marker's y points down and its z into the paper
   mount.holder_from_marker = Pose(half_turn, {0, 0, (mount.plate_mm + options.paper_mm) / 1000});
   return mount;
 }
 
 Status run_mount(const MountOptions& options) {
   if (!(options.size_mm >= k_smallest && options.size_mm <= k_largest))
-    return usage_error("--size-mm: expected {} to {} mm, the markers that A4 holds, found {}.", k_smallest,
-                       k_largest, options.size_mm);
+    return usage_error("--size-mm: expected {} to {} mm, which fits on A4, found {}.", k_smallest, k_largest,
+                       options.size_mm);
   if (!(options.paper_mm >= 0 && options.paper_mm <= 2))
     return usage_error("--paper-mm: expected 0 to 2 mm of paper and glue, found {}.", options.paper_mm);
   if (options.out.extension() != ".stl")

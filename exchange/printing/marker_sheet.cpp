@@ -21,9 +21,9 @@ namespace {
 
 constexpr double k_points_per_mm = 72 / 25.4;
 constexpr double k_page_width = 210, k_page_height = 297;  // mm, A4
-constexpr double k_edge = 10;                              // mm that printers leave white
-constexpr double k_foot = 16;                              // mm at the bottom for the bar
-constexpr double k_label = 6;                              // mm below a marker for its name
+constexpr double k_edge = 10;                              // mm that printers leave white at the edges
+constexpr double k_foot = 16;                              // mm at the bottom, for the bar
+constexpr double k_label = 6;                              // mm below a marker, for its name
 constexpr double k_bar = 100;                              // mm
 
 struct Sheet {
@@ -61,8 +61,8 @@ Status write_sheet(Sheet& sheet, const std::filesystem::path& path) {
 
 void set_grey(cairo_t* cairo, double level) { cairo_set_source_rgb(cairo, level, level, level); }
 
-// An image as vectors: all pixels of a grey level are rectangles of one path, so that neighbours leave no
-// seam.
+// Draws an image as vectors: all pixels of a grey level are rectangles of one path, so that there are no
+// seams between neighbours.
 void draw_cells(cairo_t* cairo, const cv::Mat& image, double x_mm, double y_mm, double mm_per_pixel) {
   std::map<std::uint8_t, std::vector<cv::Rect>> levels;
   for (int y = 0; y < image.rows;) {
@@ -130,7 +130,7 @@ Result<Grid> grid_for(double size_mm) {
   return grid;
 }
 
-// Frame to cut along, the top-left mark in it, the marker, its name.
+// Draws the frame to cut along with its mark at the top left, the marker, and its name.
 void draw_marker_cell(cairo_t* cairo,
                       const cv::Mat& cells,
                       const std::string& label,
@@ -206,7 +206,7 @@ std::filesystem::path page_path(const std::filesystem::path& out, int page) {
 
 }  // namespace
 
-// An eighth of the side: a cell or more of every family.
+// An eighth of the side, which is at least one cell for every family.
 double margin_mm(double size_mm) { return std::max(3.0, size_mm / 8); }
 
 Result<MarkerSheet> write_marker_sheet(const MarkerSheetOptions& options) {

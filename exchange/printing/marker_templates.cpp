@@ -40,15 +40,16 @@ void print_verdict(const TemplateSimilarity& worst) {
   const std::string who = worst.a == worst.b ? worst.a + " and itself turned" : worst.a + " and " + worst.b;
   switch (worst.telling) {
     case Discriminability::confused:
-      fmt::print("Worst: {}: confused, correlation above {:g}: change one.\n", who,
+      fmt::print("Worst: {}: confused, correlation above {:g}: change one of them.\n", who,
                  1 - tracker::k_min_rotation_lead);
       return;
     case Discriminability::alike:
-      fmt::print("Worst: {}: alike, correlation of {:g} or more: the detector may take one for the other.\n",
-                 who, tracker::k_min_correlation);
+      fmt::print(
+          "Worst: {}: alike, correlation of {:g} or more: the detector may mistake one for the other.\n", who,
+          tracker::k_min_correlation);
       return;
     case Discriminability::apart:
-      fmt::print("Worst: {}: apart; all are told apart.\n", who);
+      fmt::print("Worst: {}: apart; all can be distinguished.\n", who);
   }
 }
 
@@ -88,8 +89,8 @@ Status compare_templates(const std::vector<std::filesystem::path>& files, const 
   const auto& templates = families.templates();
   for (const auto& pattern : templates)
     if (pattern.size != templates.front().size)
-      return error("{}: expected {} values a side as in {}, found {}. Train both alike.", pattern.id,
-                   templates.front().size, templates.front().id, pattern.size);
+      return error("{}: expected {} values on each side as in {}, found {}. Train both in the same size.",
+                   pattern.id, templates.front().size, templates.front().id, pattern.size);
   const auto pairs = tracker::compared(templates);
   print_table(pairs);
   print_verdict(pairs.front());

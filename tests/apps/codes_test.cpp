@@ -15,7 +15,7 @@
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/virtual_capture.h"
 
-// Every code's whole way on the virtual rig: a plan, its captures, the rig that they give.
+// Tests each code from end to end on the virtual rig: a plan, its captures, the rig solved from them.
 
 namespace limn::apps {
 namespace {
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using namespace test;
 using Json = nlohmann::json;
 
-constexpr double k_share = 0.375;  // of each device's pixels by side: 480 x 384 and 480 x 300
+constexpr double k_share = 0.375;  // scale of each device's image sides: 480 x 384 and 480 x 300 pixels
 constexpr int k_poses = 6;
 
 Json json_at(const fs::path& path) {
@@ -36,7 +36,7 @@ Json small_bench() {
   Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
   for (const char* key : {"scene", "world_from_prototype", "slot_markers"}) world.erase(key);
   world["objects"] = Json::array();
-  world["room"]["lamps"][0].erase("radius_m");  // soft shadows cost half of the tracing
+  world["room"]["lamps"][0].erase("radius_m");  // soft shadows take half of the ray tracing's time
   for (const char* list : {"cameras", "projectors"}) {
     for (Json& device : world[list]) {
       for (Json& side : device["size"]) side = std::lround(k_share * side.get<double>());
@@ -48,7 +48,7 @@ Json small_bench() {
   return world;
 }
 
-// Where a code's files stand, and what came of them.
+// The results of one code.
 struct Calibrated {
   Json report;
   Rig rig, truth;
@@ -78,9 +78,9 @@ Calibrated calibrated(const fs::path& folder, const Json& world, const Json& cod
           sim::load_world(folder / "world.json", marker_image).value().rig};
 }
 
-// RMS distance between the light of the solved projector and of the true one, given the same pixels, on what
-// the true camera sees at depths around the working volume's middle. Places come from the same camera, so
-// that it stands for how a prototype is lit: the solved camera says where a point is, in its own frame.
+// RMS distance between the light of the solved projector and of the true one for the same pixels, on what the
+// true camera sees at depths around the working volume's middle. The points are measured by the same camera,
+// as when a prototype is lit: the solved camera says where a point is, in its own frame.
 double light_apart_mm(const Rig& rig, const Rig& truth) {
   const Imager &camera = rig.cameras[0], &true_camera = truth.cameras[0];
   const Imager &projector = rig.projectors[0], &true_projector = truth.projectors[0];
@@ -127,7 +127,7 @@ TEST(Codes, EachGivesARigAsGoodAsGrays) {
   }
 }
 
-// Of 3 steps, which hide nothing of a wrong response; it is measured on a wall.
+// Phase with 3 steps, which cancels no error of the response; the response is measured on a wall.
 TEST(Codes, PhaseIsDrawnByTheResponseThatASolveMeasured) {
   const fs::path folder = test_folder();
   Json world = small_bench();

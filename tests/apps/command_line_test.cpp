@@ -1,5 +1,5 @@
-// What the program says to bad input, from the outside: exit code 1 for work that failed, 2 for wrong usage,
-// and a message that names the place.
+// Tests the program's answers to bad input: exit code 1 if the work failed, 2 for wrong usage, and a message
+// that names the place of the problem.
 
 #include "apps/command_line.h"
 
@@ -41,7 +41,7 @@ Outcome run(std::vector<std::string> arguments) {
 
 class CommandLine : public testing::Test {
  protected:
-  // Expects the exit code and every part in the message.
+  // Expects this exit code, and each of these parts in the message.
   void expect(const std::vector<std::string>& arguments, int code, const std::vector<std::string>& parts) {
     const Outcome outcome = run(arguments);
     EXPECT_EQ(outcome.code, code) << outcome.err << outcome.out;
@@ -63,7 +63,7 @@ class CommandLine : public testing::Test {
     rig.projectors = {{"projector0", 320, 200, Lens::pinhole(400, 400, 159.5, 99.5), Pose()}};
     ASSERT_TRUE(save_rig(rig, folder_ / "rig"));
   }
-  // A scene of one triangle as the prototype and a slot, whose scene.json the test may spoil.
+  // A scene with one triangle as the prototype and one slot; tests may damage its scene.json.
   nlohmann::json scene() {
     write("scene/tri.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     return nlohmann::json::parse(R"({
@@ -329,8 +329,8 @@ TEST_F(CommandLine, NamesInAWorldCannotLeaveTheOutputFolder) {
   }
 }
 
-// Every value of a rig and a scene replaced by something else: each time a message or a success, never an
-// exception. The output folder cannot be made, so that what loads goes no further.
+// Replaces every value of a rig and a scene by something else: each time there must be a message or a
+// success, never an exception. The output folder cannot be created, so that a valid scene is not drawn.
 TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
   using Json = nlohmann::json;
   write_rig();
@@ -384,7 +384,7 @@ TEST_F(CommandLine, BenchNamesTheBenchesThereAre) {
          {"tracking", "tracker, id, calib, solve, projector, live, remote, tablet"});
 }
 
-TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // none stands beside the test's own
+TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // there is none beside the test program
   expect({"bench", "tracker", "--frames", "1"}, 1, {"tests/bench/tracker_bench", "libapriltag-dev"});
 }
 

@@ -27,7 +27,7 @@ void contains(const std::string& message, const std::string& part) {
   EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
 }
 
-// The finding of that area and name; the first of the area when the name is empty.
+// The first finding of that area and name; an empty name fits all.
 Finding found(const std::vector<Finding>& findings, const std::string& area, const std::string& name = "") {
   for (const Finding& finding : findings)
     if (finding.area == area && (name.empty() || finding.name == name)) return finding;

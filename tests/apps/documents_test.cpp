@@ -1,5 +1,5 @@
-// What the pages for people say is so: their commands and options exist, and what they quote is what is
-// printed.
+// Tests that the documents are right: their commands and options exist, and the quoted output is the real
+// output.
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -36,7 +36,7 @@ struct Quoted {
   std::vector<std::string> options;
 };
 
-// Of "limn COMMAND …" in code lines and between back ticks; a code line ends at "#".
+// Finds "limn COMMAND …" in code lines and between back ticks; a code line ends at "#".
 std::vector<Quoted> quoted_commands(const fs::path& page) {
   static const std::regex code(R"((?:^    |`)(?:\./)?limn ([a-z]+)((?: [^`#]*)?))"),
       option(R"((?:^|[\s(])(--[a-z-]+))");
@@ -67,7 +67,7 @@ TEST(Documents, EveryCommandAndOptionExists) {
         help = helps.emplace(quoted.command, printed({quoted.command, "--help"}, &code)).first;
         EXPECT_EQ(code, 0) << quoted.where << ": limn " << quoted.command;
       }
-      if (quoted.command == "bench") continue;  // its options are those of the benches
+      if (quoted.command == "bench") continue;  // its options belong to the benches
       for (const std::string& option : quoted.options) {
         ++options;
         EXPECT_TRUE(std::regex_search(help->second,

@@ -26,7 +26,7 @@ Json json_at(const fs::path& path) {
   return Json::parse(read_file(path).value(), nullptr, true, /*ignore_comments=*/true);
 }
 
-// The bench without its prototype; its projector's target raised by `up_m`.
+// The bench without its prototype; its projector's target is raised by `up_m`.
 fs::path bench_world(const fs::path& path, double up_m) {
   Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
   for (const char* key : {"scene", "world_from_prototype", "slot_markers"}) world.erase(key);
@@ -35,7 +35,7 @@ fs::path bench_world(const fs::path& path, double up_m) {
   return path;
 }
 
-// A plan of one pose, well in the light.
+// A plan with one pose, where the light reaches the board well.
 fs::path plan_of(const fs::path& world) {
   Json plan = json_at(fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json");
   plan["world"] = world.filename();
@@ -45,8 +45,8 @@ fs::path plan_of(const fs::path& world) {
   return path;
 }
 
-// RMS distance, on the plane y = 0 around the working volume's middle, between the lights of two projectors
-// that are given the same pixels.
+// RMS distance between the lights of two projectors for the same pixels, on the plane y = 0 around the
+// working volume's middle.
 double light_apart_mm(const Imager& a, const Imager& b) {
   double squares = 0;
   int count = 0;
@@ -77,7 +77,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   const auto before = rechecked(sound);
   ASSERT_TRUE(before) << before.message();
   EXPECT_EQ(before->result.verdict, RigVerdict::sound);
-  // 15 s hold 150 images at ten a second: six projectors of this size.
+  // In 15 s there are 150 images at ten per second, enough for six projectors of this size.
   EXPECT_EQ(before->images, 11 + 10 + 2);
   EXPECT_EQ(load_rig(sound.out).value().projectors[0].imager_from_world.matrix(),
             load_rig(sound.rig).value().projectors[0].imager_from_world.matrix());
@@ -87,7 +87,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   ASSERT_TRUE(undecided) << undecided.message();
   EXPECT_EQ(undecided->result.verdict, RigVerdict::undecided);
 
-  // The same captures, with the board where it stood before.
+  // The same captures; the board is where it was before.
   RecheckCommand again{
       .rig = folder / "rig", .captures = nudged.out / "captures", .out = folder / "repaired"};
   again.still = sound.out / "recheck.json";
@@ -107,7 +107,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   EXPECT_EQ(told["verdict"], "nudged");
   EXPECT_TRUE(told["boards"].contains("pose00"));
 
-  // A reference that knows nothing of this pose, and one that is no recheck.json.
+  // A reference without this pose, and a file that is no recheck.json.
   Json other = told;
   other["boards"] = {{"pose77", told["boards"]["pose00"]}};
   ASSERT_TRUE(write_file(folder / "other.json", other.dump()).ok());
@@ -117,7 +117,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   EXPECT_NE(rechecked(again).message().find("limn.recheck/1"), std::string::npos);
 }
 
-// The studio with its prototype; projector1's target raised by `up_m`.
+// The studio with its prototype; projector1's target is raised by `up_m`.
 fs::path studio_plan(const fs::path& folder, double up_m) {
   const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
   Json world = json_at(config / "worlds/studio.json");

@@ -25,8 +25,8 @@ using Eigen::Vector3d;
 using nlohmann::json;
 namespace fs = std::filesystem;
 
-// An arrow that stands on its marker: a post of 40 mm side and 120 mm up (towards -z), with a flag at its top
-// that points to the marker's right.
+// An arrow that stands on its marker: a post with 40 mm sides, 120 mm high (towards -z), with a flag at its
+// top that points to the marker's right.
 std::string flag_obj() {
   return "v -20 -20 0\nv 20 -20 0\nv 20 20 0\nv -20 20 0\nv -20 -20 -120\nv 20 -20 -120\nv 20 20 -120\nv -20 "
          "20 -120\n"
@@ -57,7 +57,7 @@ Imager test_camera() {
   return camera;
 }
 
-// A photograph of a marker of 50 mm on white paper: every pixel's ray met with its plane, 16 rays a pixel.
+// A photograph of a marker of 50 mm on white paper, with 16 rays per pixel onto its plane.
 cv::Mat photographed(const MarkerName& name, const Imager& camera, const Pose& camera_from_marker) {
   const cv::Mat marker = tracker::draw_marker(name, 40).value();
   const Pose marker_from_camera = camera_from_marker.inverse();
@@ -99,7 +99,7 @@ TEST(Render, StandsAPartOnAMarkerOfAnImage) {
 
   const cv::Mat out = read_image(folder / "out" / "composite-camera0.png").value();
   ASSERT_EQ(out.size(), cv::Size(800, 600));
-  // The flag's tip in the truth: light on one side of it, paper on the other.
+  // The flag's true tip: the flag on one side of it, paper on the other.
   const auto at = [&](const Vector3d& p_marker) {
     const Vector2d px = *rig.cameras[0].project(camera_from_marker * p_marker);
     return out.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
@@ -135,7 +135,7 @@ class RenderDoor : public testing::Test {
     options.poses = folder / "poses.json";
     options.out = folder / "out";
   }
-  // The parts on the door where the virtual rig's worlds have them.
+  // The parts on the door as in the virtual rig's worlds.
   static json poses() {
     const scene::Scene scene = sim::car_door_scene();
     const auto places = sim::car_door_slot_places();
@@ -198,7 +198,7 @@ TEST_F(RenderDoor, SeveralViewersShareTheEyeOfThoseOnTheNearestOnesSide) {
                               looking_at(p_eye, {0, 0, 0}, {0, 1, 0}).inverse(), 45));
   const cv::Mat shared = light(files), near_alone = light({files[0]});
   EXPECT_EQ(cv::norm(shared, light({files[0], files[1]}), cv::NORM_INF), 0)
-      << "who stands at another side does not count";
+      << "a viewer on another side does not count";
   EXPECT_GT(cv::norm(shared, near_alone, cv::NORM_INF), 20);
 
   const scene::Scene scene = scene::load_scene(options.scene).value();
@@ -295,12 +295,13 @@ TEST_F(RenderDoor, AVirtualCameraSeesPrototypeAndPartsWithOneEyeOrTwo) {
   const cv::Mat one = read_image(folder / "out/view.png").value();
   ASSERT_EQ(one.size(), cv::Size(400, 300));
   EXPECT_GT(cv::norm(one.at<cv::Vec3b>(150, 200), one.at<cv::Vec3b>(2, 2), cv::NORM_INF),
-            20);  // the door, the room
+            20);  // the door, not the room
   options.stereo_mm = 60;
   ASSERT_TRUE(run_render(options));
   const cv::Mat two = read_image(folder / "out/view.png").value();
   ASSERT_EQ(two.size(), cv::Size(800, 300));
-  // 1.2 m away the door stands further right in the left eye's image: focal length x base line / distance.
+  // The door, 1.2 m away, is further right in the left camera's image, by focal length x base line /
+  // distance.
   const double expected_px = 200 / std::tan(20 * std::numbers::pi / 180) * 0.06 / 1.17;
   cv::Mat grey;
   cv::cvtColor(two, grey, cv::COLOR_BGR2GRAY);
@@ -323,7 +324,7 @@ TEST_F(RenderDoor, MistakesAreErrors) {
   wrong.poses.clear();
   failed(wrong, true, "--poses");
   wrong.frames = {"camera0"};
-  failed(wrong, true, "CAMERA=PICTURE");
+  failed(wrong, true, "CAMERA=");
   wrong.frames = {"camera7=x.png"};
   failed(wrong, true, "camera0");
   wrong.frames = {"camera0=" + (folder / "nowhere.png").string()};
@@ -342,7 +343,7 @@ TEST_F(RenderDoor, MistakesAreErrors) {
   failed(wrong, false, "no-rig");
 }
 
-// A box from `lower` to `upper` (mm) in a material, as OBJ; `first` counts the vertices before.
+// A box from `lower` to `upper` (mm) with a material, as OBJ; `first` is the number of earlier vertices.
 std::string box_obj(const Vector3d& lower, const Vector3d& upper, const std::string& material, int first) {
   std::string text = "usemtl " + material + "\n";
   for (int k = 0; k < 8; ++k) {
@@ -358,7 +359,7 @@ std::string box_obj(const Vector3d& lower, const Vector3d& upper, const std::str
   return text;
 }
 
-// A mirror on a stand, y up from the table, z towards the onlooker: a foot as large as the marker, a post at
+// A mirror on a stand, y up from the table, z towards the viewer: a foot as large as the marker, a post at
 // its back, a frame with a glass.
 void write_standing_mirror(const fs::path& folder) {
   EXPECT_TRUE(write_file(
@@ -371,7 +372,8 @@ void write_standing_mirror(const fs::path& folder) {
                                                     box_obj({-41, 54, -11}, {41, 96, -9}, "glass", 24)));
 }
 
-// How it looks a person judged; what stays is that the foot covers the marker of the photograph, and no more.
+// A person judged the appearance. The test keeps that the foot covers the marker of the photograph, and
+// nothing else.
 TEST(RenderPhotograph, StandsAMirrorOnAMarker) {
   const auto data = test::real_data("markers/opencv");
   if (!data) GTEST_SKIP() << "no photographs: markers/opencv";
@@ -406,7 +408,7 @@ TEST(RenderPhotograph, StandsAMirrorOnAMarker) {
   const Status status = run_render(options);
   ASSERT_TRUE(status) << status.message();
   const cv::Mat mask = read_image(folder / "out/mask-mirror40.png").value();
-  // Corners of marker 40 by opencv_singlemarkers_6x6_250.csv.
+  // Corners of marker 40 from opencv_singlemarkers_6x6_250.csv.
   const std::vector<cv::Point> marker = {{359, 310}, {404, 310}, {410, 350}, {362, 350}};
   cv::Mat inside = cv::Mat::zeros(mask.size(), CV_8U);
   cv::fillConvexPoly(inside, marker, 255);
@@ -414,8 +416,8 @@ TEST(RenderPhotograph, StandsAMirrorOnAMarker) {
   EXPECT_EQ(cv::countNonZero(inside & (mask == 0)), 0);
   EXPECT_EQ(cv::countNonZero(mask.rowRange(354, 480)), 0);  // nothing below the marker's lower edge
   const cv::Rect box = cv::boundingRect(mask);
-  EXPECT_LT(box.y, 270) << box;                       // and 100 mm up from it: some 80 px
-  EXPECT_NEAR(box.x + box.width / 2, 392, 8) << box;  // above the foot at 383, leaning out as uprights do
+  EXPECT_LT(box.y, 270) << box;                       // and 100 mm up from it, about 80 px
+  EXPECT_NEAR(box.x + box.width / 2, 392, 8) << box;  // above the foot at 383, tilted outwards by perspective
 }
 
 }  // namespace

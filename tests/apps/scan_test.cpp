@@ -39,7 +39,7 @@ struct Errors {
   double rms_mm = 0, mean_mm = 0, rms_pull = 0, within_two = 0, normal_rms_deg = 0;
 };
 
-// Of the points that the camera sees on the clay itself: their distances from it along its normal.
+// The distances along the normal from the clay, for the points where the camera sees the clay itself.
 Errors errors_on_clay(const scene::ScanSurface& surface, const sim::World& world, std::size_t every) {
   const sim::Truth truth(world);
   const Imager& camera = world.rig.cameras[0];
@@ -69,7 +69,7 @@ Errors errors_on_clay(const scene::ScanSurface& surface, const sim::World& world
 
 nlohmann::json read_json(const fs::path& path) { return nlohmann::json::parse(read_file(path).value()); }
 
-// One scan of the virtual door by the true rig, then a CAD laid onto it.
+// Scans the virtual door with the true rig and aligns a CAD mesh to the scan.
 TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   const fs::path out = test::test_folder();
   const sim::World world = bench();
@@ -86,10 +86,11 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
     const Errors e = errors_on_clay(*surface, world, 23);
     printf("[ scan     ] %s: %.3f mm RMS off the clay, pulls %.2f\n", name, e.rms_mm, e.rms_pull);
     EXPECT_GT(e.count, 5000);
-    EXPECT_LT(e.rms_mm, 0.15);  // 0.11 measured; asked: 0.3
+    EXPECT_LT(e.rms_mm, 0.15);  // 0.11 measured; required: 0.3
     EXPECT_LT(std::abs(e.mean_mm), 0.03);
     EXPECT_GT(e.rms_pull,
-              0.8);  // 1.3 measured: the code's ripple between whole pixels is not all in the deviations
+              0.8);  // 1.3 measured: the standard deviations do not contain all of the code's ripple between
+                     // whole pixels
     EXPECT_LT(e.rms_pull, 1.5);
     EXPECT_GT(e.within_two, 0.85);
     EXPECT_LT(e.normal_rms_deg, 4);
@@ -119,7 +120,7 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   const auto report = read_json(align.out / "align.json");
   EXPECT_TRUE(report["free_directions"].empty());
   EXPECT_GE(report["differences"].size(),
-            4U);  // the plates of the markers stand on the clay, up to 3 mm above
+            4U);  // the plates of the markers, up to 3 mm above the clay
   for (const auto& difference : report["differences"]) {
     EXPECT_GT(difference["mean_mm"], 0);
     EXPECT_LT(difference["worst_mm"], 5);
@@ -127,7 +128,7 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   for (const char* name : {"residual.ply", "residual.png", "residual-side.png"})
     EXPECT_TRUE(fs::exists(align.out / name)) << name;
 
-  // Its markers as a body that was learned, in the frame of one of them: they are found on the CAD.
+  // The door's markers as a learned body, in the frame of one of them: they are found on the CAD mesh.
   const std::vector<BodyMarker>& on_door = world.scene->prototype->markers;
   nlohmann::json body = {{"schema", "limn.body/1"}, {"markers", nlohmann::json::array()}};
   for (const BodyMarker& marker : on_door)
@@ -172,7 +173,7 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   EXPECT_NE(wrong.message().find("check --units"), std::string::npos) << wrong.message();
   EXPECT_FALSE(fs::exists(align.out));
 
-  // Another rig: a projector of another size, then one that has been turned by two degrees.
+  // Another rig: first a projector of another size, then one that is turned by two degrees.
   Rig other = world.rig;
   other.projectors[0].width = 1920;
   ASSERT_TRUE(save_rig(other, out / "rig-size").ok());
@@ -211,7 +212,7 @@ TEST(Scan, LaysPosesOfAMovedPrototypeOntoEachOtherWhenTold) {
   command.captures = out / "captures";
   command.rig = out / "rig";
   command.out = out / "scan";
-  command.far_m = 1.75;  // before the wall
+  command.far_m = 1.75;  // in front of the wall
   const Status untold = run_scan(command);
   ASSERT_FALSE(untold.ok());
   EXPECT_NE(untold.message().find("--moved"), std::string::npos) << untold.message();
@@ -230,7 +231,7 @@ TEST(Scan, LaysPosesOfAMovedPrototypeOntoEachOtherWhenTold) {
   const Errors e = errors_on_clay(*mesh, world, 23);
   RecordProperty("rms_mm", std::to_string(e.rms_mm));
   EXPECT_GT(e.count, 3000);
-  EXPECT_LT(e.rms_mm, 0.2);  // asked: 0.3
+  EXPECT_LT(e.rms_mm, 0.2);  // required: 0.3
 }
 
 TEST(Scan, CallsWrongOptionsWrongUsage) {

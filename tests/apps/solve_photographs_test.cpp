@@ -24,7 +24,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using nlohmann::json;
 
-// What a joint mrcal solve gets from the same kind of judge (docs/measurements.md).
+// The errors of a joint mrcal solve, measured in the same way (docs/measurements.md).
 constexpr double k_max_cells_px = 0.165, k_max_worst_cells_px = 0.228;
 constexpr double k_max_corners_px = 0.262, k_max_worst_corners_px = 0.385;
 constexpr double k_max_held_out_px = 0.20;
@@ -39,22 +39,22 @@ SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {
   return options;
 }
 
-// The board's corners by OpenCV alone, in the white image; by our ids.
+// The board's corners found by OpenCV alone in the white image, with our ids.
 std::map<int, Vector2d> opencv_corners(const fs::path& folder, const calib::Board& board) {
   const cv::Mat white = cv::imread(folder / "graycode_40.png", 0);
   std::vector<cv::Point2f> found;
   EXPECT_TRUE(cv::findChessboardCorners(white, {board.columns - 1, board.rows - 1}, found));
   cv::cornerSubPix(white, found, {5, 5}, {-1, -1},
                    {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 100, 1e-4});
-  // The board looks the same when turned; either reading is a pose of it.
+  // The board looks the same when it is turned; both readings give a valid pose.
   std::map<int, Vector2d> corners;
   for (size_t i = 0; i < found.size(); ++i) corners[static_cast<int>(i)] = {found[i].x, found[i].y};
   return corners;
 }
 
-// Pose of a flat board by OpenCV's PnP on undistorted corners, all of them; none of the solver's code. (In
-// captures 1 and 2 the sheet's corner stands off the plane: the camera sees three corners up to 3 px from
-// where a flat board has them. Without them the plane fits the rest better and predicts these worse.)
+// Pose of a flat board by OpenCV's PnP on all undistorted corners, without the solver's code. (In captures 1
+// and 2 the corner of the sheet is bent off the plane: the camera sees three corners up to 3 px from their
+// positions on a flat board. Without them the plane fits the other corners better and predicts these worse.)
 Pose pnp(const std::vector<std::pair<int, Vector2d>>& corners,
          const Imager& camera,
          const calib::Board& board) {
@@ -71,7 +71,7 @@ Pose pnp(const std::vector<std::pair<int, Vector2d>>& corners,
           Vector3d(tvec.at<double>(0), tvec.at<double>(1), tvec.at<double>(2))};
 }
 
-// A plain decoding, none of ours: signs of image minus inverse, and a pixel counts when every bit is clear.
+// A plain decoding without our code: the signs of image minus inverse; a pixel counts if every bit is clear.
 cv::Mat plain_labels(const fs::path& folder) {
   constexpr int k_bits = 10, k_clear = 3, k_lit = 10;
   const auto shot = [&](int i) { return cv::imread(folder / fmt::format("graycode_{:02d}.png", i), 0); };
@@ -106,7 +106,7 @@ struct Sample {
 std::optional<Sample> mean_of(const std::vector<Sample>& samples, double near) {
   constexpr size_t k_least = 20;
   if (samples.size() < k_least) return std::nullopt;
-  // A plane by least squares, twice: the second time without what is far from the first.
+  // Fits a plane by least squares, twice: the second time without outliers of the first.
   std::vector<Sample> kept = samples;
   for (int pass = 0;; ++pass) {
     Sample mean{Vector2d::Zero(), Vector2d::Zero()};
@@ -128,7 +128,7 @@ std::optional<Sample> mean_of(const std::vector<Sample>& samples, double near) {
   }
 }
 
-// What the judge measures of a pose: corners by the camera, cells and corners by the projector.
+// The measurements of one pose: corners in the camera, cells and corners in the projector.
 struct Measured {
   std::vector<std::pair<int, Vector2d>> corners;
   std::vector<Sample> cells;
@@ -163,7 +163,7 @@ Measured measured(std::map<int, Vector2d> at, const calib::Board& board, const c
       if (const auto mean = mean_of(cell, 3)) m.cells.push_back(*mean);
     }
   }
-  // The usual way to a projector's corners: a homography of the labels around each.
+  // The usual way to find a projector's corners: a homography of the labels around each.
   constexpr int k_half = 23;
   for (const auto& [id, px] : m.corners) {
     std::vector<cv::Point2f> from, to;
@@ -195,7 +195,7 @@ struct Score {
   double rms() const { return std::sqrt(squared / count); }
 };
 
-// One pose on a flat board, from the written .cameramodel files alone.
+// Tests one pose with a flat board, using the written .cameramodel files alone.
 void judge(const Measured& m,
            const Imager& camera,
            const Imager& projector,
@@ -228,8 +228,8 @@ TEST(SolvePhotographs, FiveRealPosesHoldOutByTheReportAndByAnIndependentJudge) {
   const json report = json::parse(read_file(folder / "rig" / "report.json").value());
   EXPECT_LE(report["held_out"]["rms_px"], k_max_held_out_px);
   EXPECT_EQ(report["held_out"]["poses"].size(), 5U);
-  // Of pixels lit directly. Of all with 10 levels between white and black, floor in reflected light included,
-  // it is 0.84 (0.81 before sub-pixel decoding).
+  // Share of the pixels lit directly. Of all pixels with 10 levels between white and black, which includes
+  // the floor in reflected light, it is 0.84 (0.81 before sub-pixel decoding).
   EXPECT_GE(report["decode"]["share"], 0.9);
 
   const calib::Board board = calib::Board::parse("chessboard:9x7:75mm").value();

@@ -33,8 +33,8 @@ using namespace test;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-// A camera and a shifted projector before a ChArUco board, drawn by looking up board and pattern along camera
-// rays.
+// A camera and a shifted projector in front of a ChArUco board; images are drawn by intersecting camera rays
+// with the board and reading its texture and the pattern there.
 struct Stage {
   Imager camera{"camera0", 640, 480,
                 Lens::create("LENSMODEL_OPENCV4", {800, 800, 322, 238, -0.1, 0.05, 0, 0}).value(), Pose()};
@@ -43,7 +43,7 @@ struct Stage {
       Pose(exp_rotation({0.25, 0, 0}), Vector3d::Zero()) * looking_at({-0.35, 0, 0}, {0, 0, 1}, {0, -1, 0})};
   calib::Board board = calib::Board::parse("charuco:8x6:40mm").value();
   calib::BoardSheet sheet = calib::draw_board(board, {.square_px = 48});
-  static constexpr int k_samples = 2;  // by each axis of a pixel
+  static constexpr int k_samples = 2;  // along each axis of a pixel
 
   Pose world_from_board(int pose) const {
     const double around = 2.2 * pose, tilt = 0.45;
@@ -98,7 +98,7 @@ struct Stage {
     return photo;
   }
 
-  // Two markers, 250 mm from centre to centre, on a sheet that is put where the board would be.
+  // Two markers, 250 mm from centre to centre, on a sheet that replaces the board.
   calib::BoardSheet bar() const {
     calib::BoardSheet made{cv::Mat(160, 420, CV_8U, cv::Scalar(255)), 1000, {49.5, -40.5}};
     for (const int id : {3, 7}) {
@@ -178,13 +178,13 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
   EXPECT_EQ(report["devices"].size(), 2U);
   EXPECT_TRUE(report["seconds"].contains("total"));
 
-  // Lens models were chosen; each device has one.
+  // Lens models were chosen, one for each device.
   int chosen = 0;
   for (const auto& trial : report["lens_models"]) chosen += trial["chosen"].get<bool>() ? 1 : 0;
   EXPECT_EQ(chosen, 2);
   EXPECT_GT(report["lens_models"].size(), 4U);
 
-  // Where light lands on a thing that was not captured is what the report predicts.
+  // The error of light on a surface that was not captured agrees with the report's prediction.
   TrueRig known;
   known.rig.cameras = {truth.camera};
   known.rig.projectors = {truth.projector};
@@ -197,7 +197,7 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
   EXPECT_LT(p95(missed_mm), 2 * stated);
 }
 
-// Every file's text, without what a clock wrote into it.
+// The text of every file, without times.
 std::map<std::string, std::string> files_of(const fs::path& folder) {
   std::map<std::string, std::string> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -215,7 +215,7 @@ std::map<std::string, std::string> files_of(const fs::path& folder) {
   return files;
 }
 
-// While it lives, this thread and those that it starts run on one core.
+// As long as it lives, this thread and the threads that it starts run on one core.
 class OnOneCore {
  public:
   OnOneCore() {
@@ -264,7 +264,7 @@ TEST(SolveCommand, UsesASceneWithoutABoard) {
   const calib::Observations& seen = report->observed.observations;
   ASSERT_GT(seen.points.size(), 50U);
   EXPECT_EQ(seen.points.size(), seen.tie_observations.size()) << "one camera, one projector";
-  // What of the residual depth cannot take up: across the epipolar lines.
+  // The part of the residual that depth cannot absorb, across the epipolar lines.
   std::vector<double> lengths;
   for (const Vector2d& r : report->solution.tie_point_residuals) lengths.push_back(r.norm());
   EXPECT_LT(median(std::move(lengths)), 0.2);
@@ -293,8 +293,8 @@ TEST(SolveCommand, ChangesNothingWhenCapturesAreDamaged) {
   EXPECT_TRUE(run_solve({.captures = captures, .out = out, .skip_poses = {"pose03"}}).ok());
 }
 
-// A linear camera before a wall, darker on its left, that a projector of gamma 1.8 lights within a frame;
-// each camera pixel sees a mixture of the four projector pixels around it.
+// A linear camera in front of a wall, darker on its left, that a projector of gamma 1.8 lights inside a
+// frame. Each camera pixel sees a mixture of the four projector pixels around it.
 cv::Mat photograph_of_response(const cv::Mat& shown, int width, int height) {
   cv::Mat photo(height, width, CV_8U);
   for (int y = 0; y < height; ++y)
@@ -310,7 +310,7 @@ cv::Mat photograph_of_response(const cv::Mat& shown, int width, int height) {
             light += albedo * share * 0.27 * (0.01 + 0.99 * std::pow(bgr[c] / 255.0, 1.8));
         }
       const int dither =
-          (x * 37 + y * 101) % 64;  // instead of noise: what 8 bits need to tell parts of a level
+          (x * 37 + y * 101) % 64;  // replaces noise: without it, 8 bits cannot show parts of a level
       photo.at<uchar>(y, x) = cv::saturate_cast<uchar>(255 * light + dither / 64.0 - 0.5);
     }
   return photo;
@@ -376,7 +376,7 @@ TEST(SolveCommand, NamesCopiedImagesAndTheBoardThatWasReallyThere) {
   EXPECT_NE(other.find("charuco:7x5:40mm"), std::string::npos) << other;
 }
 
-// The board is described as 39 mm a square instead of 40: no residual shows it, the bar does.
+// The board is described with squares of 39 mm instead of 40: no residual shows it, but the scale bar does.
 TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig with bar";
   const Stage stage;
@@ -420,7 +420,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
     EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
 }
 
-// Each pose's stripes are those of another pose: nothing fits anything.
+// Each pose has the stripes of another pose: nothing fits together.
 TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "contradicted";
   const auto stripes = [&](int pose) { return captures / fmt::format("pose{:02d}", pose) / "camera0"; };

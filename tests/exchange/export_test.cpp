@@ -50,7 +50,7 @@ std::vector<std::string> files_in(const fs::path& folder) {
   return names;
 }
 
-// The door of config/scenes, turned in the world, before two projectors with lenses that bend.
+// The door of config/scenes, turned in the world, in front of two projectors with lens distortion.
 class ExportDoor : public testing::Test {
  protected:
   void SetUp() override {
@@ -74,7 +74,7 @@ class ExportDoor : public testing::Test {
     return {
         {"mirror", {{"world_from_part", to_json(Pose(Eigen::Quaterniond::Identity(), {-0.1, 0.1, 0.1}))}}}};
   }
-  // What the renderer says of a projector.
+  // The renderer's results for one projector.
   std::pair<cv::Mat, cv::Mat> drawn(std::size_t index) const {
     const auto context = device::GlContext::create().value();
     const scene::Scene scene = scene::load_scene(options.scene).value();
@@ -111,7 +111,7 @@ TEST_F(ExportDoor, ComesBackWithItsPointsSharesAndProjectors) {
     const Pose projector_from_prototype = rig.projectors[i].imager_from_world * world_from_prototype;
     EXPECT_TRUE(test::pose_near(imager.imager_from_world, projector_from_prototype, 1e-9, 1e-12));
     EXPECT_EQ(imager.lens.values, rig.projectors[i].lens.values);
-    // Without Limn's own extension the pinhole and the distortion map say the same.
+    // Without Limn's own extension, the pinhole and the distortion map give the same result.
     MpcdiRegion foreign = region;
     foreign.lens.reset();
     const Imager pinhole = *imager_of(foreign);
@@ -289,7 +289,7 @@ TEST_F(ExportDoor, MistakesAreErrors) {
   failed(wrong, false, "projectors");
 }
 
-// Two pinholes side by side before a sheet, so that a point's pixel in one is 160 pixels beside that in the
+// Two pinholes side by side in front of a sheet: a point's pixel in one is 160 pixels beside that in the
 // other.
 TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
   const fs::path folder = test::test_folder();
@@ -349,7 +349,7 @@ TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
       } else {
         ++alone;
         worst = std::max(worst, std::abs(share / 65535.0 - 1));
-        // Shown alone, the projector's light is its own black and what the other's black would give.
+        // When it is shown alone, the projector's light is its own black plus the other's black.
         const Vector3d p(q[0], q[1], q[2]);
         const double light = lookup(responses.projectors[0].green, least / 65535.0) - black[0];
         const double missing = black[1] * irradiance(1, p) / irradiance(0, p) * (1 - black[0]);
@@ -363,8 +363,8 @@ TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
   EXPECT_LT(worst_light, 0.01);
 }
 
-// As Christie's Mystique writes it: XML alone, filesets beside an empty `files`, empty paths, lenses that are
-// no pinholes in an extension.
+// As Christie's Mystique writes it: XML alone, filesets beside an empty `files`, empty paths, and lenses in
+// an extension that are no pinholes.
 std::string christie_xml() {
   const auto region = [](const std::string& id, const std::string& eye, const std::string& angles) {
     return "<region id=\"" + id +
@@ -414,15 +414,15 @@ TEST(Import, TakesProjectorsInChristiesForm) {
   const Imager& first = rig.projectors[0];
   EXPECT_EQ(first.name, "Projector 1");
   EXPECT_EQ(first.width, 1400);
-  // Turned left by 45 degrees it looks at the origin; z is up, so what is higher is further up in its
-  // image. Its image reaches one half to either side at a distance of one, and down to -10 degrees.
+  // Turned left by 45 degrees, it looks at the origin; z is up, so higher points are further up in its image.
+  // At a distance of one, its image reaches one half to either side; it reaches down to -10 degrees.
   const double middle = 1050 * std::tan(30_deg) / (std::tan(30_deg) + std::tan(10_deg)) - 0.5;
   EXPECT_TRUE(near(*first.project({0, 0, 0}), Vector2d(699.5, middle), 1e-6));
   const double side = std::sqrt(0.5);
   EXPECT_TRUE(
       near(*first.project(Vector3d(side, side, 0) * std::sqrt(0.5) / 2), Vector2d(1399.5, middle), 1e-4));
   EXPECT_LT(first.project({0, 0, 0.1})->y(), middle);
-  // The other looks down at the origin with its right side turned down: +x is up in its image.
+  // The other one looks down at the origin with its right side turned down: +x is up in its image.
   const Imager& second = rig.projectors[1];
   EXPECT_TRUE(near(*second.project({0, 0, 0}), Vector2d(699.5, middle), 1e-6));
   EXPECT_LT(second.project({0.1, 0, 0})->y(), middle - 10);
@@ -436,7 +436,7 @@ TEST(Import, TakesProjectorsInChristiesForm) {
   EXPECT_EQ(report["regions"][1]["frustum_deg"]["pitch"], -45);
 }
 
-// Numbers of the example that Christie publishes: the projector was aimed at the origin, 1.4 m away.
+// The numbers of Christie's published example: the projector points at the origin, 1.4 m away.
 TEST(Import, AimsAPublishedProjectorWhereItWasAimed) {
   MpcdiRegion region;
   region.width = 1400;
@@ -461,7 +461,7 @@ TEST(Import, KeepsDevicesInsideTheRigFolder) {
   EXPECT_EQ(load_rig(folder / "a/b/rig")->projectors[1].name, ".._.._P_");
 }
 
-// A small archive of another program, version 1.0, to be broken.
+// A small archive of another program, version 1.0, for tests that damage it.
 struct Foreign {
   std::string xml = R"(<?xml version="1.0"?>
 <MPCDI profile="a3" level="1" date="2013-02-01 10:12:21" version="1.0">
@@ -477,7 +477,7 @@ struct Foreign {
   std::string pfm, alpha, beta;
 
   Foreign() {
-    // Big-endian, a grid of 4x3 nodes, its first row the bottom one.
+    // Big-endian, a grid of 4x3 nodes, bottom row first.
     pfm = "PF 4 3 1\n";
     for (int node = 0; node < 12; ++node) {
       for (const float number : {100.0f * static_cast<float>(node), 1000.0f, node == 5 ? k_nan : -2000.0f}) {
@@ -631,7 +631,7 @@ TEST(Import, SurvivesDamageAndNamesTheFile) {
     ++refused;
     EXPECT_NE(read.message().find("foreign.mpcdi"), std::string::npos) << read.message();
   }
-  EXPECT_GT(refused, 100);  // names, dates, points and the like may change without harm
+  EXPECT_GT(refused, 100);  // changed names, dates, points and so on do no harm
 }
 
 TEST(Import, UnpacksNoBomb) {
@@ -644,7 +644,7 @@ TEST(Import, UnpacksNoBomb) {
     EXPECT_NE(read.message().find(what), std::string::npos) << read.message();
   };
   says(Foreign::read_bytes(bytes), "when unpacked");
-  // The archive lies about the size (little-endian, in the file's own header and in the directory).
+  // The archive states a wrong size (little-endian, in the file's own header and in the directory).
   const std::string truth("\x00\x00\x80\x0c", 4), lie("\x90\x00\x00\x00", 4);
   int lies = 0;
   for (auto at = bytes.find(truth); at != std::string::npos; at = bytes.find(truth, at + 4), ++lies)

@@ -23,12 +23,12 @@ using Triangle = std::array<Eigen::Vector3f, 3>;
 
 struct Printed {
   std::vector<Triangle> triangles;       // mm
-  std::vector<Eigen::Vector3f> normals;  // as the file says
+  std::vector<Eigen::Vector3f> normals;  // as written in the file
   Config json;
   fs::path stl;
 };
 
-// What `limn markers --mount` wrote, byte by byte.
+// Reads what `limn markers --mount` wrote, byte by byte.
 Printed printed(double size_mm) {
   MarkersOptions options;
   options.size_mm = size_mm;
@@ -81,7 +81,7 @@ TEST_P(Sizes, IsOneClosedSurfaceThatFacesOutwards) {
     EXPECT_EQ(times, 1);
     EXPECT_EQ(edges.count({edge.second, edge.first}), 1u) << "an edge has a triangle on one side only";
   }
-  // Euler: V - E + F = 2 for one ball.
+  // Euler: V - E + F = 2 for a closed surface without holes.
   EXPECT_EQ(static_cast<int>(points.size()) - static_cast<int>(edges.size()) / 2 +
                 static_cast<int>(mount.triangles.size()),
             2);
@@ -89,7 +89,7 @@ TEST_P(Sizes, IsOneClosedSurfaceThatFacesOutwards) {
   const double side = root.at("side_mm").number(), plate = root.at("plate_mm").number();
   const double bore = root.at("socket_mm").number() / 2, depth = root.at("socket_depth_mm").number();
   const double without = side * side * plate - std::numbers::pi * bore * bore * (depth + bore / 3);
-  EXPECT_NEAR(volume, without, 0.05 * without);  // chamfer and guides are not in it
+  EXPECT_NEAR(volume, without, 0.05 * without);  // `without` ignores chamfer and guides
 }
 
 TEST_P(Sizes, PrintsWithoutSupports) {
@@ -108,7 +108,7 @@ TEST_P(Sizes, HoldsTheMarkerWhereItSaysAndInSight) {
   const ConfigNode root = mount.json.root();
   const double half = GetParam() / 2, paper = root.at("paper_side_mm").number() / 2;
   const Pose holder_from_marker = root.at("holder_from_marker").pose();
-  // The face under the paper is flat, whole and as far behind the marker's plane as the paper is thick.
+  // The face under the paper is flat, complete, and behind the marker's plane by the paper's thickness.
   const double face = 1000 * holder_from_marker.translation.z() - root.at("paper_mm").number();
   double area = 0;
   for (const auto& [a, b, c] : mount.triangles) {
@@ -117,7 +117,8 @@ TEST_P(Sizes, HoldsTheMarkerWhereItSaysAndInSight) {
   }
   EXPECT_GE(area, 4 * paper * paper);
   EXPECT_NEAR(area, 4 * paper * paper, 8 * paper * 3);
-  // Marker's corners: x right, y down, z into the holder; a camera 75 degrees off sees each over the guides.
+  // The marker's corners: x right, y down, z into the holder; a camera 75 degrees off sees each of them over
+  // the guides.
   EXPECT_TRUE(test::near(holder_from_marker * Eigen::Vector3d(0.01, 0, 0) - holder_from_marker.translation,
                          Eigen::Vector3d(0.01, 0, 0), 1e-12));
   EXPECT_TRUE(test::near(holder_from_marker * Eigen::Vector3d(0, 0.01, 0) - holder_from_marker.translation,
@@ -128,9 +129,9 @@ TEST_P(Sizes, HoldsTheMarkerWhereItSaysAndInSight) {
       const double beyond = std::max(std::abs(p.x()), std::abs(p.y())) - half;
       const double above = p.z() - face;
       if (above > 1e-4) {
-        EXPECT_GT(beyond, paper - half);          // guides stand outside the paper,
-        EXPECT_LT(above * steep, 0.51 * beyond);  // low enough
-        EXPECT_GE(above, 0.19);                   // a layer of a printer at least
+        EXPECT_GT(beyond, paper - half);          // guides are outside the paper
+        EXPECT_LT(above * steep, 0.51 * beyond);  // and low enough
+        EXPECT_GE(above, 0.19);                   // at least one layer of a printer
       }
     }
   }
@@ -146,7 +147,8 @@ TEST(MarkerMount, IsReadBackAsAMesh) {
     least = least.cwiseMin(p);
     most = most.cwiseMax(p);
   }
-  // 40 mm marker, 5 mm white margins, play and guides of 2.15 mm; bore 6.2 + cone 3.1 + 1.2, guides 0.6.
+  // The marker is 40 mm, its white margins 5 mm, play and guides 2.15 mm; the bore 6.2 + cone 3.1 + 1.2, the
+  // guides 0.6.
   EXPECT_TRUE(test::near(most.cast<double>(), Eigen::Vector3d(0.02715, 0.02715, 0.0111), 1e-6));
   EXPECT_TRUE(test::near(least.cast<double>(), Eigen::Vector3d(-0.02715, -0.02715, 0), 1e-6));
   EXPECT_TRUE(test::pose_near(mount.json.root().at("holder_from_marker").pose(),

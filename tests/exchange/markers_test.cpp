@@ -18,7 +18,8 @@
 namespace limn::apps {
 namespace {
 
-// Prints a sheet of 40 mm markers at 5 px a mm and reads it back: these ids, upright, true to size.
+// Draws a printed sheet of 40 mm markers at 5 px per mm and detects its markers: these ids, upright, in true
+// size.
 void expect_printed(const std::string& family,
                     const std::string& ids,
                     const std::set<std::string>& expected) {
@@ -97,7 +98,7 @@ TEST(Markers, TellWrongUsage) {
   EXPECT_TRUE(wrong(bad));
 }
 
-// Images of a plate with four markers, one of them bent up, turned before a distorting camera.
+// Images of a plate with four markers, one of them bent up, turned in front of a camera with lens distortion.
 TEST(Markers, LearnABodyFromItsImages) {
   using namespace test::literals;
   auto rng = test::test_rng();

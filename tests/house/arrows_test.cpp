@@ -1,5 +1,5 @@
-// The house's arrows (docs/architecture.md): which room may include which, and that no folder includes
-// another in a circle.
+// Tests the dependencies in docs/architecture.md: which room may include which, and that no folders include
+// each other in a circle.
 
 #include <gtest/gtest.h>
 
@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using Names = std::set<std::string>;
 
-// Each room, and the rooms that it may include. exchange/printing is a room of its own.
+// Each room and the rooms that it may include. exchange/printing counts as a room.
 const std::map<std::string, Names>& allowed() {
   static const Names k_libraries = {"core", "scene", "device", "calib", "tracker", "projector", "sim"};
   static const auto with = [](const Names& more) {
@@ -51,8 +51,7 @@ const std::map<std::string, Names>& allowed() {
   return arrows;
 }
 
-// The folders inside a room, in the order in which they stand on each other; equals may not include each
-// other.
+// The folders inside a room and their levels: a folder may include only folders of lower levels.
 const std::map<std::string, std::map<std::string, int>>& inner_order() {
   static const std::map<std::string, std::map<std::string, int>> order = {
       {"calib",
@@ -69,7 +68,7 @@ const std::map<std::string, std::map<std::string, int>>& inner_order() {
   return order;
 }
 
-// Third parties that stay private to some rooms: include prefix -> rooms.
+// Third parties that only some rooms may include: include prefix -> rooms.
 const std::map<std::string, Names>& guests() {
   static const std::map<std::string, Names> homes = {
       {"mrcal/", {"core", "calib"}},
@@ -98,10 +97,10 @@ const std::map<std::string, Names>& guests() {
   return homes;
 }
 
-// A file's include.
+// One #include in a file.
 struct Include {
   fs::path file;
-  std::string folder;  // of the file, from the root
+  std::string folder;  // folder of the file, from the root
   std::string what;
 };
 
@@ -115,7 +114,7 @@ std::string folder_of(const std::string& path) {
   return slash == std::string::npos ? "" : path.substr(0, slash);
 }
 
-// The room that a folder belongs to; empty: none.
+// The room that a folder belongs to; empty if there is none.
 std::string room_of(std::string folder) {
   while (!folder.empty() && !allowed().contains(folder)) folder = folder_of(folder);
   return folder;
@@ -150,7 +149,7 @@ const std::vector<Include>& includes() {
   static const std::vector<Include> all = [] {
     std::vector<Include> found;
     for (const auto& [room, may] : allowed()) {
-      if (room.find('/') != std::string::npos) continue;  // its files are found in the room around it
+      if (room.find('/') != std::string::npos) continue;  // its files belong to the room around it
       const auto more = includes_in(root() / room);
       found.insert(found.end(), more.begin(), more.end());
     }
@@ -180,7 +179,7 @@ TEST(House, FoldersOfARoomIncludeOnlyThoseBefore) {
     const std::string room = room_of(include.folder), to = folder_of(include.what);
     if (!inner_order().contains(room) || room_of(to) != room) continue;
     const auto& order = inner_order().at(room);
-    ASSERT_TRUE(order.contains(include.folder)) << include.folder << ": give this folder its place";
+    ASSERT_TRUE(order.contains(include.folder)) << include.folder << ": add this folder to inner_order()";
     ASSERT_TRUE(order.contains(to)) << include.file << " includes " << include.what;
     ++seen;
     EXPECT_TRUE(include.folder == to || order.at(to) < order.at(include.folder))
@@ -189,10 +188,10 @@ TEST(House, FoldersOfARoomIncludeOnlyThoseBefore) {
   EXPECT_GT(seen, 100) << "the sources were not found";
 }
 
-// folder -> the folders that it includes, each with one include that shows it.
+// folder -> the folders that it includes, each with one include as an example.
 using Graph = std::map<std::string, std::map<std::string, std::string>>;
 
-// The first circle that a walk from `folder` meets, as lines for people; empty: none.
+// The first circle that is found from `folder`, as lines for people; empty if there is none.
 std::string circle_from(const std::string& folder,
                         const Graph& graph,
                         std::vector<std::string>* way,
@@ -244,7 +243,7 @@ TEST(House, ACircleIsFound) {
   EXPECT_EQ(circle_in({{"a", {{"b", ""}, {"c", ""}}}, {"b", {{"c", ""}}}}), "");
 }
 
-// Tests as well: a folder of tests may use another one's worlds.
+// Includes the tests, because a folder of tests may use another one's worlds.
 TEST(House, NoFolderIncludesAnotherInACircle) {
   std::vector<Include> all = includes();
   const auto tests = includes_in(root() / "tests");
@@ -265,7 +264,7 @@ int lines_in(const fs::path& folder) {
 
 TEST(House, NoRoomIsTooLargeToKnow) {
   constexpr int k_most = 9000, k_most_commands = 6000;
-  const Names larger = {"calib", "tracker"};  // calib by its folders, tracker by its one task
+  const Names larger = {"calib", "tracker"};  // calib is divided into folders, tracker has only one task
   for (const auto& [room, may] : allowed()) {
     if (larger.contains(room)) continue;
     EXPECT_LE(lines_in(root() / room), room == "apps" ? k_most_commands : k_most) << room;
@@ -309,8 +308,8 @@ TEST(House, HeadersKeepSlowThirdPartiesOut) {
 
 // ---- words ----
 
-// The glossary's list under the heading "Do not use": lines "- picture, in words (a remark) -> what to use
-// instead". Words with a remark are right in another meaning and are left to readers; several words are
+// Reads the glossary's list under the heading "Do not use": lines "- picture, in words (a remark) -> what to
+// use instead". Words with a remark have another, right meaning and are not searched; several words are
 // searched joined by "_".
 Names words_not_to_use() {
   std::ifstream in(root() / "docs/glossary.md");
@@ -372,7 +371,7 @@ TEST(House, StringsAndCommentsAreNoCode) {
   EXPECT_EQ(code_alone("R\"x(one \" two)x\" three"), "  three");
 }
 
-// An identifier as words in lower case, each between "_": "PictureWriter" and "picture_writer_" are
+// An identifier as lower-case words, each between "_": "PictureWriter" and "picture_writer_" are
 // "_picture_writer_".
 std::string as_words(const std::string& identifier) {
   std::string words = "_";

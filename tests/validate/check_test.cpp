@@ -1,5 +1,5 @@
-// `limn check`: the shipped checks hold; each measure misses its limit when the renderer is told something
-// wrong; broken files are named.
+// Tests `limn check`: the shipped checks pass; each measure misses its limit when the renderer knows
+// something wrong; broken files are named.
 
 #include "apps/check.h"
 
@@ -46,7 +46,7 @@ Outcome run(std::vector<std::string> arguments) {
   return outcome;
 }
 
-// A check file in `folder` on a world of config/worlds; `rest`: its members but schema, about and world.
+// A check file in `folder` on a world of config/worlds. `rest`: its members except schema, about and world.
 fs::path written(const fs::path& folder, const std::string& world, const std::string& rest) {
   const fs::path file = folder / "small.json";
   const fs::path relative = fs::relative(k_config / "worlds" / (world + ".json"), folder);
@@ -102,7 +102,7 @@ TEST(Check, AFileSaysWhatStandsWhereAndWhatTheRendererIsNotTold) {
   EXPECT_NEAR(true_projector.lens.cy() - told.lens.cy(), -0.25, 1e-9);
   EXPECT_EQ(loaded->truth.rig.projectors[0].lens.values, loaded->told.rig.projectors[0].lens.values);
 
-  // Without poses everything stands where the world has it.
+  // Without poses everything is where the world has it.
   const auto plain = load_check(written(
       test::test_folder(), "studio", fmt::format(R"("viewer": {}, "limits": {{"mask_iou": 1}})", k_viewer)));
   ASSERT_TRUE(plain) << plain.message();
@@ -117,7 +117,7 @@ TEST(Check, SeveralViewersShareAnEye) {
   const auto told = load_check(written(test::test_folder(), "studio",
                                        fmt::format(R"("viewer": {}, "limits": {{"shared_mm": 1}})", two)));
   ASSERT_TRUE(told) << told.message();
-  // Weight over distance from the middle of the door.
+  // The weight divided by the distance from the middle of the door.
   const Eigen::Vector3d p_middle = *scene::middle_of(*told->truth.scene, told->posed);
   const Eigen::Vector3d p_near(-0.3, -1, 0.6), p_far(0.3, -2, 0.6);
   const double near = 1 / (p_near - p_middle).norm(), far = 3 / (p_far - p_middle).norm();
@@ -129,7 +129,7 @@ TEST(Check, SeveralViewersShareAnEye) {
   ASSERT_EQ(told->shares.size(), 2u);
   EXPECT_NEAR(told->shares[1].share, far / (near + far), 1e-9);
 
-  // The scene's own, one with a cap that stands in the world.
+  // The scene's own viewers, one with a cap that is in the world.
   const fs::path folder = test::test_folder();
   fs::copy(k_config / "scenes/door", folder / "door");
   auto scene = nlohmann::json::parse(read_file(folder / "door/scene.json").value(), nullptr, true, true);
@@ -159,7 +159,7 @@ class CheckJudge : public testing::Test {
     if (!loaded) throw std::runtime_error(loaded.message());
     return std::move(loaded).value();
   }
-  // Values by measure.
+  // The values by measure.
   static std::map<std::string, CheckReading> readings(const Check& check) {
     auto result = judged(check);
     if (!result) throw std::runtime_error(result.message());
@@ -167,7 +167,7 @@ class CheckJudge : public testing::Test {
     for (const CheckReading& reading : result->readings) by_name.emplace(reading.limit.measure.name, reading);
     return by_name;
   }
-  // Every limit holds for `good` and is missed for `wrong`.
+  // Expects that every limit holds for `good` and is missed for `wrong`.
   static void expect_missed(const Check& good, const Check& wrong) {
     for (const auto& [name, reading] : readings(good))
       EXPECT_TRUE(reading.good()) << name << " " << reading.value;
@@ -248,7 +248,7 @@ TEST_F(CheckJudge, LightThatEndsEarlyLeavesAGapBesideTheScreenAndLightTooBrightS
   EXPECT_FALSE(readings(bright).at("edge_double_share").good());
 }
 
-// Drawn for one of them alone the other sees it twice as far off.
+// If the parts are drawn for one viewer alone, the other sees twice the error.
 TEST_F(CheckJudge, AnEyeThatIsNotBetweenItsViewersMissesWhatTheyAreJudgedBy) {
   const Check good = check("studio", R"("resolution": 0.5, "limits": {"shared_mm": 15.5}, "viewer": [
       {"eye_m": [-0.35, -1.3, 0.7], "target_m": [0, 0, 0.4], "size": [320, 240], "fov_deg": 44},
@@ -408,8 +408,8 @@ TEST(Check, BrokenFilesAreNamedWithThePlaceInThem) {
   EXPECT_NE(absent.err.find("absent.json"), std::string::npos) << absent.err;
 }
 
-// Every value of a check file replaced by something else: each time a message or a success, never an
-// exception.
+// Replaces every value of a check file by something else: each time there must be a message or a success,
+// never an exception.
 TEST(Check, FilesWithAnyValueSpoiledNeverCrash) {
   using Json = nlohmann::json;
   const fs::path folder = test::test_folder();
@@ -439,7 +439,7 @@ TEST(Check, FilesWithAnyValueSpoiledNeverCrash) {
       if (*loaded) continue;
       ++refused;
       EXPECT_NE(loaded->message().find(folder.filename().string()),
-                std::string::npos)  // it or a file that it names
+                std::string::npos)  // this file or one that it names
           << place << " " << loaded->message();
     }
   }
@@ -457,7 +457,7 @@ TEST(Check, WrongUsageExitsWithTwo) {
   EXPECT_NE(same.err.find("different file names"), std::string::npos) << same.err;
 }
 
-// A fresh program (this one, asked for one test only) where EGL finds no driver.
+// Starts a new program (this one, with one test only) where EGL finds no driver.
 TEST(Check, WithoutEglTheErrorSaysWhatToDo) {
   if (std::getenv("LIMN_TEST_WITHOUT_EGL")) {
     const fs::path folder = test::test_folder();

@@ -1,4 +1,4 @@
-// The whole session on the virtual rig, as `limn demo` runs it, against what is asked of it.
+// Plays the whole session on the virtual rig, as `limn demo` does, and checks its limits.
 
 #include "apps/demo.h"
 

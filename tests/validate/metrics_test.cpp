@@ -12,7 +12,7 @@ namespace {
 using namespace test::literals;
 
 constexpr double k_distance_m = 1;
-constexpr double k_focal_px = 1000;  // 1 mm on the plane a pixel
+constexpr double k_focal_px = 1000;  // 1 mm on the plane for each pixel
 
 // A plane of 0.4 x 0.3 m at z = 1 m in front of a pinhole projector at the origin.
 sim::World plane_world() {
@@ -34,7 +34,7 @@ sim::World plane_world() {
   return world;
 }
 
-// The discs drawn by hand into the projector's image (light = value), moved by `shift_px`: 8x8 sub-pixels.
+// The discs drawn directly into the projector's image (light = value), moved by `shift_px`: 8x8 sub-pixels.
 cv::Mat drawn(const AimedDots& dots, double shift_px) {
   constexpr int k_sub = 8;
   const double radius_px = (dots.mesh.positions[1] - dots.mesh.positions[0]).norm() * k_focal_px;
@@ -93,7 +93,7 @@ TEST(Judge, DarknessCountsAsError) {
   EXPECT_GT(found.rms_mm, 3);
 }
 
-// An eye before and beside the plane, looking at its middle.
+// A viewpoint in front of the plane and to its side, looking at its middle.
 Imager eye_beside() {
   const Pose eye_from_world = looking_at({0.5, -0.2, -0.1}, {0, 0, k_distance_m}, -Eigen::Vector3d::UnitY());
   return viewer_imager(eye_from_world.inverse(), 640, 480, 40);
@@ -118,7 +118,8 @@ TEST(Judge, LightBesideAFloatingDotIsMeasuredAsTheEyeSeesIt) {
   const std::vector<cv::Mat> right = {drawn(dots, 0)}, beside = {drawn(dots, 1)};
   EXPECT_LT(judged_registration(world, dots, right).rms_mm, 0.03);
   const Registration found = judged_registration(world, dots, beside);
-  // 1 mm along x on the plane, foreshortened for an eye 24 degrees off and 5 % nearer in the discs' planes.
+  // 1 mm along x on the plane, foreshortened from a viewpoint 24 degrees off; the discs' planes are 5 %
+  // nearer.
   EXPECT_GT(found.rms_mm, 0.8);
   EXPECT_LT(found.rms_mm, 0.95);
 }
