@@ -92,7 +92,7 @@ export function make_looks(session) {
       );
       for (const card of list.children) card.show(state, saves.stamp(card.key));
       back.hidden = !state.deleted_look;
-      set_text(back.lastElementChild, `Restore ${state.deleted_look}`);
+      set_text(back.lastElementChild, `Undelete ${state.deleted_look}`);
       flip.disabled = !state.other_look;
       set_text(flip.lastElementChild, state.other_look ? `Compare with ${state.other_look}` : "Compare");
       flip.title = state.other_look ? "" : "Save or show two looks, then compare them.";
