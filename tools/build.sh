@@ -7,7 +7,7 @@ install_packages() {
   local wanted missing=() runner=()
   mapfile -t wanted < <(cat "$@" | sed 's/#.*//; /^[[:space:]]*$/d')
   if ! command -v dpkg-query >/dev/null; then
-    say "expected a Debian 12 system with apt; install the equivalents of packages.txt by hand."
+    say "expected a Debian 12 system with apt, found no dpkg-query. Install the equivalents of packages.txt by hand."
     return 0
   fi
   for package in "${wanted[@]}"; do
@@ -16,7 +16,7 @@ install_packages() {
   [ ${#missing[@]} -eq 0 ] && return 0
   if [ "$(id -u)" -ne 0 ]; then
     if ! command -v sudo >/dev/null; then
-      say "these Debian packages are missing and there is no sudo; as root: apt-get install ${missing[*]}"
+      say "these Debian packages are missing, and there is no sudo to install them. Run as root: apt-get install ${missing[*]}"
       return 1
     fi
     runner=(sudo)
@@ -31,11 +31,11 @@ install_packages() {
     return 0
   fi
   tail -n 20 "$log" >&2
-  say "apt-get could not install the packages above (whole log: $log)."
+  say "apt-get could not install the packages above. Complete log: $log"
   return 1
 }
 
-# Passes on ninja's "[12/345]" every few seconds as one line of progress.
+# Copies ninja's output, and prints its progress "[12/345]" every few seconds.
 show_progress() {
   local line last=0
   while IFS= read -r line; do
@@ -47,7 +47,7 @@ show_progress() {
   done
 }
 
-# build TARGET: nothing to do when no source is newer than the last build of TARGET.
+# build TARGET: builds it, unless no source is newer than its last build.
 build() {
   local target="$1" folder="$root/build/release" stamp="$root/build/release/.built-$1"
   local packages=("$root/packages.txt")
@@ -70,6 +70,6 @@ build() {
     return 0
   fi
   grep -E -A 20 'error|FAILED|Error' "$log" | head -n 60 >&2
-  say "the build failed; whole log: $log"
+  say "the build failed. Complete log: $log"
   return 1
 }

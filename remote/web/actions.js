@@ -1,5 +1,5 @@
-// What somebody did, in words, and which role may do it. The table of actions is the session's own (`hello` brings it), so an
-// action stands here only where the page calls it otherwise than its name; a test compares the two.
+// Describes edits in words, and knows which role an action needs. The table of actions comes from the session (message
+// `hello`), so this file lists only actions whose label differs from their name; a test compares the two.
 
 const k_words = {
   "choose_variant": "variant",
@@ -18,9 +18,9 @@ const k_words = {
   "viewer": "view parts for"
 };
 
-const known = new Map(); // the session's table by name
+const known = new Map(); // the session's table of actions, by name
 
-/** Takes over the session's table of actions. */
+/** Stores the session's table of actions. */
 export function take_actions(table) {
   for (const action of table ?? []) known.set(action.name, action);
 }
@@ -32,7 +32,7 @@ export function role_of(name) {
 
 const label_of = (name) => k_words[name] ?? name.replaceAll("_", " ");
 
-// The value of an edit, in words.
+// The value of an edit in words.
 function value_of(edit, state) {
   const takes = known.get(edit.action)?.takes;
   if (takes === "on_off") return state[edit.action === "freeze" ? "frozen" : edit.action] ? "on" : "off";
@@ -41,7 +41,7 @@ function value_of(edit, state) {
   return edit.value && (takes === "millimetres" || takes === "number") ? `${edit.value} mm` : edit.value;
 }
 
-/** What somebody did, in words for people. */
+/** Describes an edit in words. */
 export function in_words(edit, state) {
   if (!edit?.action) return "";
   const slot = state.slots.find((s) => s.name === edit.slot);

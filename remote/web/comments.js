@@ -1,4 +1,4 @@
-// Remarks pinned to looks and parts: shown, and written by whoever may.
+// Comments on looks and parts: a list of them and a form to write one.
 import { h, icon, keep } from "/dom.js";
 
 function made(comment) {
@@ -13,7 +13,7 @@ function made(comment) {
   return h("li", {}, head, h("p", {}, comment.text));
 }
 
-/** A list of comments and a line to write one; node.show(comments) shows them, `target()` says {look, slot} of a new one. */
+/** Makes a list of comments and a form; node.show(comments) shows them, `target()` gives {look, slot} of a new comment. */
 export function make_comments(session, target, label) {
   const list = h("ul", { class: "comments" });
   const none = h("p", { class: "soft small" }, "No comments yet.");

@@ -1,6 +1,6 @@
-// Elements, made and kept in place: a state that arrives changes what differs, so focus and scrolling stay where they are.
+// Makes elements and keeps them: a new state changes only what differs, so focus and scroll positions stay.
 
-/** An element. Properties that begin with "on" are listeners, functions and booleans are properties, the rest attributes. */
+/** Makes an element. Properties that begin with "on" become listeners, booleans become properties, all others attributes. */
 export function h(tag, properties, ...children) {
   const node = document.createElement(tag);
   for (const [name, value] of Object.entries(properties ?? {})) {
@@ -12,7 +12,7 @@ export function h(tag, properties, ...children) {
   return node;
 }
 
-/** A drawing of icons.svg; says nothing to a screen reader. */
+/** Makes an icon of icons.svg, hidden from screen readers. */
 export function icon(name) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   const use = document.createElementNS("http://www.w3.org/2000/svg", "use");
@@ -23,7 +23,7 @@ export function icon(name) {
   return svg;
 }
 
-/** Gives `parent` one child for each item, in order: made by make(item) once for its key, then child.update(item). */
+/** Gives `parent` one child for each item, in order. make(item) is called once for each key, then child.update(item). */
 export function keep(parent, items, key, make) {
   const old = new Map([...parent.children].map((child) => [child.key, child]));
   let at = parent.firstElementChild;
@@ -42,7 +42,7 @@ export function keep(parent, items, key, make) {
   for (const child of old.values()) child.remove();
 }
 
-/** Sets a node's text when it differs: a screen reader hears only what is new. */
+/** Sets a node's text only if it differs, so that a screen reader reads only changes. */
 export function set_text(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }

@@ -1,4 +1,4 @@
-// Binary glTF 2.0, as far as Limn writes it: triangles with positions, normals, base colours and textures, in nodes with transforms.
+// Reads binary glTF 2.0, as far as Limn writes it: triangles with positions, normals, base colours and textures, in nodes with transforms.
 
 const k_magic = 0x46546c67,
   k_json = 0x4e4f534a,
@@ -6,7 +6,7 @@ const k_magic = 0x46546c67,
 const k_types = { 5121: Uint8Array, 5123: Uint16Array, 5125: Uint32Array, 5126: Float32Array };
 const k_counts = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4 };
 
-/** a times b, both column after column as glTF and WebGL have them. */
+/** The product a b of two 4x4 matrices, both column-major as in glTF and WebGL. */
 export function product(a, b) {
   const out = new Float32Array(16);
   for (let column = 0; column < 4; ++column)
@@ -51,7 +51,7 @@ function chunks_of(buffer) {
   return [JSON.parse(new TextDecoder().decode(chunks[k_json])), chunks[k_bin]];
 }
 
-// An accessor's numbers; rows that interleave with others or are not aligned are copied together.
+// Returns an accessor's numbers, copied so that rows that are interleaved or unaligned become contiguous.
 function numbers_of(gltf, bin, index) {
   const accessor = gltf.accessors[index],
     view = gltf.bufferViews[accessor.bufferView];
@@ -67,7 +67,7 @@ function numbers_of(gltf, bin, index) {
   return new Type(packed.buffer);
 }
 
-// Normals of a mesh that has none: of each triangle, summed at its corners.
+// Computes normals for a mesh without them: the sum of the adjacent triangles' normals at each vertex.
 function normals_of(positions, indices) {
   const normals = new Float32Array(positions.length);
   for (let i = 0; i + 2 < indices.length; i += 3) {
@@ -80,7 +80,7 @@ function normals_of(positions, indices) {
   return normals;
 }
 
-// A material's texture; the same picture is decoded once.
+// Returns a material's texture; each image is decoded only once.
 function texture_of(gltf, bin, material, decoded) {
   const index = material?.baseColorTexture?.index;
   if (index === undefined) return null;
@@ -97,8 +97,8 @@ function texture_of(gltf, bin, material, decoded) {
 }
 
 /**
- * Meshes [{name, matrix, positions, normals, uvs, indices, base, texture, is_unlit}] of a file's scene. `base` is linear RGBA; uvs and
- * texture, a bitmap, may be null. Throws in words.
+ * Returns the meshes [{name, matrix, positions, normals, uvs, indices, base, texture, is_unlit}] of a file's scene. `base` is linear
+ * RGBA; uvs and texture (a bitmap) may be null. Throws an Error whose message can be shown.
  */
 export async function read_glb(buffer) {
   const [gltf, bin] = chunks_of(buffer);

@@ -1,4 +1,4 @@
-// What the projectors and screens show.
+// The panel Light: grid, split, viewer, screens, room light, projector images.
 import { role_of } from "/actions.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { draw_picture, fetch_picture } from "/pictures.js";
@@ -8,13 +8,13 @@ import { make_switch } from "/stage.js";
 const k_screens = {
   rest: "what light cannot show",
   full: "whole parts",
-  camera: "camera alone",
-  view: "the viewer's eye",
-  stereo: "two eyes",
+  camera: "camera image only",
+  view: "the viewer's view",
+  stereo: "stereo pair",
   off: "nothing",
 };
-const k_every_ms = 700; // a projector's picture, while it is looked at
-const k_reach_mm = 300; // of the slider; the number takes more
+const k_every_ms = 700; // interval between images of a projector, while the panel is open
+const k_reach_mm = 300; // range of the slider; the number field allows more
 
 function make_split(session) {
   const is_on = make_switch(
@@ -22,14 +22,14 @@ function make_split(session) {
     "split",
     (s) => s.split,
     icon("split"),
-    h("span", {}, "Split", h("small", {}, "left of a line the look before")),
+    h("span", {}, "Split", h("small", {}, "previous look left of a line")),
   );
   const slider = h("input", {
     type: "range",
     min: -k_reach_mm,
     max: k_reach_mm,
     step: "1",
-    "aria-label": "Where the split is, mm right of the middle",
+    "aria-label": "Position of the split, mm right of the middle",
     "data-action": "split_at",
   });
   const number = h("input", {
@@ -37,14 +37,14 @@ function make_split(session) {
     step: "1",
     min: "-5000",
     max: "5000",
-    "aria-label": "Where the split is, mm",
+    "aria-label": "Position of the split, mm",
     "data-action": "split_at",
     inputmode: "decimal",
   });
   const where = h("div", { class: "line" }, slider, number, h("span", { class: "soft" }, "mm"));
   let is_sent = false,
     wanted = null;
-  // One on its way: a drag sends the newest place once the last one is done.
+  // Only one edit is in flight: a drag sends its newest position when the last edit is done.
   const move = async (mm) => {
     wanted = mm;
     if (is_sent) return;
@@ -71,11 +71,12 @@ function make_split(session) {
   return node;
 }
 
-const k_own = "\n"; // the key of the scene's own viewer: no guest's name
+const k_own = "\n"; // the key of the scene's own viewer; no guest can have this name
 
-// Whose eye view parts are drawn for: guests whose windows are open, and the one that is waited for.
+// The choice of the viewer that `view` parts are drawn for: guests whose windows are open, and the chosen one even if its
+// window sees no markers.
 function make_viewers(session) {
-  const list = h("div", { class: "choices wrap", role: "group", "aria-label": "Whose eye view parts are drawn for" });
+  const list = h("div", { class: "choices wrap", role: "group", "aria-label": "The viewer that view parts are drawn for" });
   const node = h(
     "div",
     { class: "stack", "data-action": "viewer", "data-needs": role_of("viewer") },
@@ -85,7 +86,7 @@ function make_viewers(session) {
   const make = (name) =>
     name === k_own
       ? session.button("viewer", { value: "" }, h("span", {}, "the scene's own viewer", h("small")))
-      : session.button("viewer", { value: name }, h("span", {}, `${name}'s eye`, h("small")));
+      : session.button("viewer", { value: name }, h("span", {}, `${name}'s tablet`, h("small")));
   node.show = (state) => {
     const names = [k_own, ...new Set([...state.windows, state.viewer].filter(Boolean))];
     keep(list, names, (name) => name, make);
@@ -93,7 +94,7 @@ function make_viewers(session) {
       const is_chosen = button.key === (state.viewer || k_own);
       button.setAttribute("aria-pressed", String(is_chosen));
       const waits = is_chosen && state.viewer && state.follows !== state.viewer;
-      set_text(button.querySelector("small"), button.key === k_own ? "" : waits ? "sees no markers now" : "a tablet");
+      set_text(button.querySelector("small"), button.key === k_own ? "" : waits ? "sees no markers now" : "");
     }
   };
   return node;
@@ -108,7 +109,7 @@ function make_projector(name) {
     "data-projector": name,
   });
   const figure = h("figure", {}, canvas, h("figcaption", {}, name));
-  let is_asked = false; // one at a time, however slow the link
+  let is_asked = false; // only one request at a time, however slow the network is
   figure.refresh = async () => {
     if (is_asked) return;
     is_asked = true;
@@ -141,7 +142,7 @@ function make_projectors(session) {
   return list;
 }
 
-// What one of several screens shows; the buttons above choose for all.
+// The choice for one of several screens; the buttons above choose for all of them.
 function make_output(session, name, screens) {
   const choice = h(
     "select",
@@ -170,7 +171,7 @@ export function make_light(session) {
     "marker_states",
     (s) => s.marker_states,
     icon("rings"),
-    h("span", {}, "Marker states", h("small", {}, "green seen, amber carried on")),
+    h("span", {}, "Marker states", h("small", {}, "green: seen, amber: predicted")),
   );
   const split = make_split(session);
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });

@@ -1,8 +1,8 @@
-// The session with Limn: pairing, one WebSocket, and coming back by itself when it breaks.
+// The connection to Limn: pairing, and one WebSocket that reconnects automatically.
 
-const k_pauses_ms = [300, 700, 1500, 3000, 5000, 10000]; // before each further try
-const k_silence_ms = 8000; // without a picture that was asked for; then the connection is looked into
-const k_answer_ms = 8000; // an edit that is not answered has failed
+const k_pauses_ms = [300, 700, 1500, 3000, 5000, 10000]; // before each further attempt to connect
+const k_silence_ms = 8000; // after this time without a requested image the connection is checked
+const k_answer_ms = 8000; // an edit that is not answered within this time has failed
 
 async function post(path, message) {
   return fetch(path, {
@@ -14,14 +14,14 @@ async function post(path, message) {
 
 /**
  * Events (detail): "status" {status, why} with status unpaired, connecting, waiting or connected; "hello", "state";
- * "picture" and "answer" {number, json, jpeg}, of the room and of the window.
+ * "picture" (image of the room) and "answer" (image of the window) {number, json, jpeg}.
  */
 export class Link extends EventTarget {
   #socket = null;
   #tries = 0;
   #timer = 0;
   #last_id = 0;
-  #waiting = new Map(); // id -> {done, failed, timer} of edits on their way
+  #waiting = new Map(); // id -> {done, failed, timer} of edits that are not answered yet
   #wants_pictures = false;
   #heard_at = 0;
   status = "unpaired";
@@ -32,18 +32,18 @@ export class Link extends EventTarget {
     super();
     addEventListener("online", () => this.#hurry());
     document.addEventListener("visibilitychange", () => this.#hurry());
-    // A page that the browser keeps for its back button is no guest meanwhile.
+    // A page in the browser's back/forward cache must not count as a guest.
     addEventListener("pagehide", () => this.#drop());
     addEventListener("pageshow", ({ persisted }) => persisted && this.status !== "unpaired" && this.connect());
     setInterval(() => this.#look_into(), 2000);
   }
 
-  /** Whether this browser was paired before and not sent away since. */
+  /** Whether this browser was paired and the pairing has not ended since. */
   static get was_paired() {
     return localStorage.getItem("limn.paired") === "yes";
   }
 
-  /** Pairs and connects; otherwise words for the person, and when to try again. */
+  /** Pairs and connects. On failure returns `why` for the person, and `wait_s` if a new attempt must wait. */
   async pair(pin, name) {
     let answer;
     try {
@@ -52,14 +52,14 @@ export class Link extends EventTarget {
       return { why: "No connection to Limn. Is it running, and are you on its network?" };
     }
     if (answer.status === 401)
-      return { why: "That is not the PIN. It stands in the operator's window.", is_pin: true };
+      return { why: "That is not the PIN. The operator's window shows it.", is_pin: true };
     if (answer.status === 429) {
       const wait_s = Number(answer.headers.get("Retry-After")) || 60;
       return { why: "Too many wrong PINs.", wait_s };
     }
     if (!answer.ok) {
       const said = await answer.json().catch(() => ({}));
-      return { why: said.error ?? `Limn could not do it (${answer.status}).` };
+      return { why: said.error ?? `Limn could not pair this device (${answer.status}). Try again.` };
     }
     localStorage.setItem("limn.paired", "yes");
     this.connect();
@@ -82,7 +82,7 @@ export class Link extends EventTarget {
     this.#socket = socket;
   }
 
-  /** Does an action; resolves with the number of the state that shows it, rejects with why not. */
+  /** Triggers an action. Resolves with the number of the first state that includes it, rejects with the reason. */
   edit(action, slot = "", value = "") {
     return this.#ask({ type: "edit", action, slot, value: String(value) });
   }
@@ -96,7 +96,7 @@ export class Link extends EventTarget {
       this.#socket.send(message instanceof ArrayBuffer ? message : JSON.stringify(message));
   }
 
-  /** Asks for room pictures, or no longer. */
+  /** Starts or stops the sending of room images. */
   want_pictures(wants) {
     if (wants === this.#wants_pictures) return;
     this.#wants_pictures = wants;
@@ -108,7 +108,7 @@ export class Link extends EventTarget {
     if (this.status !== "connected") return Promise.reject(new Error("No connection to Limn. Nothing was changed."));
     const id = ++this.#last_id;
     return new Promise((done, failed) => {
-      const timer = setTimeout(() => this.#settle(id, "Limn did not answer. Look whether it was done."), k_answer_ms);
+      const timer = setTimeout(() => this.#settle(id, "Limn did not answer. Check whether the change was made."), k_answer_ms);
       this.#waiting.set(id, { done, failed, timer });
       this.send({ ...message, id });
     });
@@ -155,7 +155,7 @@ export class Link extends EventTarget {
     this.dispatchEvent(new CustomEvent(kind === 1 ? "picture" : "answer", { detail: { number, json, jpeg } }));
   }
 
-  // Why it closed is not told to a page: asking for the state tells a session that is over from a network that is.
+  // A page is not told why its WebSocket closed. A request for the state distinguishes an ended session from a lost network.
   async #closed() {
     const was_connected = this.status === "connected";
     this.#drop();
@@ -190,7 +190,7 @@ export class Link extends EventTarget {
     const socket = this.#socket;
     this.#socket = null;
     if (socket && socket.readyState < WebSocket.CLOSING) socket.close();
-    for (const id of [...this.#waiting.keys()]) this.#settle(id, "The connection broke. Look whether it was done.");
+    for (const id of [...this.#waiting.keys()]) this.#settle(id, "The connection was lost. Check whether the change was made.");
   }
 
   #end(why) {

@@ -1,8 +1,8 @@
-// Looks: arrangements that were kept, with their pictures; saved, shown again, compared, deleted and brought back.
+// The panel Looks: saved arrangements with their images; save, show, compare, delete and restore.
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { show_picture } from "/pictures.js";
 
-/** Look pictures by the state in which they were last saved: one that was saved anew is fetched anew. */
+/** The number of the state in which each look was last saved, so that its image is fetched again after a new save. */
 export class Saves {
   #at = new Map();
   take(state) {
@@ -43,7 +43,7 @@ export function make_looks(session) {
   const none = h(
     "p",
     { class: "soft" },
-    "No looks yet. A look keeps which variants are shown and where their parts stand.",
+    "No looks yet. A look saves the variants, positions and materials of all parts, and the light.",
   );
   const back = session.button("undelete_look", { class: "wide" }, icon("undo"), h("span", {}, ""));
   const list = h("div", { class: "looks" });
@@ -51,12 +51,12 @@ export function make_looks(session) {
     "aria-label": "Name of the look to save",
     placeholder: "Name of a new look",
     maxlength: "64",
-    title: "Letters, digits, blanks, -, _ and .",
+    title: "Letters, digits, spaces, -, _ and .",
     pattern: "[A-Za-z0-9_][A-Za-z0-9_. \\-]*",
     enterkeyhint: "done",
   });
   const save = h("button", { class: "main", "data-action": "save_look" }, icon("save"), h("span", {}, "Save"));
-  // A look of that name would be written over: it is said before.
+  // The button says Replace if a look of that name exists.
   const say_what = () =>
     set_text(save.lastElementChild, session.state?.looks.includes(name.value.trim()) ? "Replace" : "Save");
   name.addEventListener("input", say_what);
@@ -92,7 +92,7 @@ export function make_looks(session) {
       );
       for (const card of list.children) card.show(state, saves.stamp(card.key));
       back.hidden = !state.deleted_look;
-      set_text(back.lastElementChild, `Bring back ${state.deleted_look}`);
+      set_text(back.lastElementChild, `Undelete ${state.deleted_look}`);
       flip.disabled = !state.other_look;
       set_text(flip.lastElementChild, state.other_look ? `Compare with ${state.other_look}` : "Compare");
       flip.title = state.other_look ? "" : "Save or show two looks, then compare them.";

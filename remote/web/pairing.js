@@ -1,8 +1,8 @@
-// The form that pairs a browser with a session: a name, so that others see whose edits these are, and a PIN.
+// The form that pairs a browser with a session, by PIN and by a name that others see beside the edits.
 import { by_id, h, set_text } from "/dom.js";
 import { Link } from "/link.js";
 
-/** Says something in the form. */
+/** Shows a message in the form. */
 export function tell_pairing(text) {
   set_text(by_id("pairing-why"), text.charAt(0).toUpperCase() + text.slice(1));
 }
@@ -45,12 +45,12 @@ function make_form(purpose, name_hint) {
     h("p", { id: "pairing-why", role: "alert" }),
     h("button", { class: "main" }, "Pair"),
     location.protocol === "https:"
-      ? h("p", { class: "soft" }, "For an app without warnings, ", h("a", { href: "/limn.crt" }, "trust this Limn"), " once.")
+      ? h("p", { class: "soft" }, "To avoid certificate warnings, ", h("a", { href: "/limn.crt" }, "install this certificate"), " once.")
       : undefined,
   );
 }
 
-/** Fills #pairing with the form, and pairs by it or by the PIN in the address, as in a QR code. */
+/** Fills #pairing with the form. Pairs with its PIN, or with the PIN in the address if a QR code was scanned. */
 export function prepare_pairing(link, purpose, name_hint) {
   const form = make_form(purpose, name_hint);
   by_id("pairing").append(form);

@@ -1,4 +1,4 @@
-// The slots: what each shows, its variants, where its part stands, which marker carries it.
+// The panel Parts: for each slot its variants, the pose and material of its part, its marker, comments.
 import { make_comments } from "/comments.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { show_picture } from "/pictures.js";
@@ -6,11 +6,11 @@ import { make_material } from "/shading.js";
 
 const k_steps_mm = ["0.1", "1", "5"];
 const k_units = ["mm", "cm", "m", "in", "ft"];
-const k_sight = { seen: "seen", "carried on": "carried on", lost: "not seen" };
+const k_sight = { seen: "seen", "carried on": "predicted", lost: "not seen" };
 
 const part_url = (slot, variant) => `/picture/variant/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.png`;
 
-/** A word for how a marker is seen, with its own shape beside its colour. */
+/** A badge with a marker's tracking state, distinguished by word, colour and shape. */
 export function sight_badge() {
   const badge = h("span", { class: "badge" });
   badge.show = (sight) => {
@@ -100,7 +100,7 @@ function make_nudge(session, slot) {
     "release",
     { slot: slot.name, class: "wide" },
     icon("release"),
-    "Follow its marker again",
+    "Follow the marker again",
   );
   const node = h("div", { class: "stack", "data-needs": "work" }, h("h3", {}, "Nudge"), steps, pad, release);
   node.show = (state_of) => {
@@ -111,7 +111,7 @@ function make_nudge(session, slot) {
   return node;
 }
 
-// Where the part is on the prototype, in numbers; it keeps its turn.
+// The part's position on the prototype in numbers; its rotation is kept.
 function make_place(session, slot) {
   const numbers = ["x", "y", "z"].map((axis) =>
     h("input", {
@@ -150,9 +150,9 @@ function make_marker(session, slot) {
   const none = h(
     "p",
     { class: "soft small" },
-    "To change it, lay another marker down and keep it still for a second.",
+    "To use another marker, lay it down and keep it still for a second.",
   );
-  const own = session.button("unpair", { slot: slot.name, class: "wide" }, "Its own marker again");
+  const own = session.button("unpair", { slot: slot.name, class: "wide" }, "Use its own marker again");
   const node = h(
     "div",
     { class: "stack" },
@@ -163,13 +163,13 @@ function make_marker(session, slot) {
   node.show = (state_of, markers) => {
     set_text(
       words,
-      `Carried by ${state_of.marker}.${state_of.is_held ? " Held where it was put until its marker moves." : ""}`,
+      `Carried by ${state_of.marker}.${state_of.is_held ? " The part stays where it was placed until its marker moves." : ""}`,
     );
     keep(
       waiting,
       markers,
       (name) => name,
-      (name) => session.button("pair", { slot: slot.name, value: name, class: "wide" }, `Carry it by ${name}`),
+      (name) => session.button("pair", { slot: slot.name, value: name, class: "wide" }, `Use marker ${name}`),
     );
     none.hidden = markers.length > 0;
   };
@@ -183,7 +183,7 @@ function make_units(session, slot) {
   const node = h(
     "div",
     { class: "stack", "data-needs": "operate" },
-    h("h3", {}, "Unit of a part dropped in"),
+    h("h3", {}, "Unit of an added part"),
     h("div", { class: "line" }, variant, unit, set),
   );
   node.show = (state_of) => {
@@ -263,7 +263,7 @@ function make_slot(session, slot) {
   return node;
 }
 
-// A marker that lies still and carries nothing is offered to every part at once.
+// A marker that lies still and carries no part is offered to all slots.
 function make_offer(session) {
   const words = h("p", {});
   const slots = h("div", { class: "strip" });
@@ -272,7 +272,7 @@ function make_offer(session) {
     const marker = state.waiting[0];
     node.hidden = !marker;
     if (!marker) return;
-    set_text(words, `Marker ${marker} lies still and carries nothing. Give it a part:`);
+    set_text(words, `Marker ${marker} lies still and carries no part. Choose a part for it:`);
     keep(
       slots,
       state.slots,
@@ -288,7 +288,7 @@ export function make_parts(session) {
   const role = h(
     "p",
     { class: "soft small", "data-role-only": "look" },
-    "You look on. To change things, leave (under Room) and pair again with the PIN for work.",
+    "You can only watch. To make changes, leave (in the panel Room) and pair again with the PIN for work.",
   );
   const list = h("div", { class: "slots" });
   by_id("parts").append(h("h2", {}, "Parts"), role, offer, list);

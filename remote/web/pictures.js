@@ -1,9 +1,9 @@
-// Pictures of the project, drawn into canvases: fetched anew when they may differ, none kept by the browser.
+// Images of the project, drawn into canvases. They are fetched again when they may have changed; the browser stores none.
 
-const k_again_ms = 2000; // after a picture that could not be had; twice as long each time
+const k_again_ms = 2000; // pause after a failed fetch; doubles each time
 const k_most_tries = 6;
 
-/** Draws what `path` gives into a canvas. A `stamp` that has not changed asks for nothing. */
+/** Draws the image at `path` into a canvas. Does nothing if path and `stamp` are the same as before. */
 export async function show_picture(canvas, path, stamp = "") {
   const wanted = `${path} ${stamp}`;
   if (canvas.wanted === wanted) return;
@@ -15,7 +15,7 @@ export async function show_picture(canvas, path, stamp = "") {
   }
 }
 
-/** A picture of the project; null when it cannot be had. */
+/** Fetches an image of the project; null on failure. */
 export async function fetch_picture(path) {
   try {
     const answer = await fetch(path, { cache: "no-store" });
@@ -25,7 +25,7 @@ export async function fetch_picture(path) {
   }
 }
 
-/** Gives a canvas the picture's size and pixels. */
+/** Draws an image into a canvas and gives the canvas its size. */
 export function draw_picture(canvas, picture) {
   if (canvas.width !== picture.width || canvas.height !== picture.height) {
     canvas.width = picture.width;

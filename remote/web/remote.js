@@ -1,4 +1,4 @@
-// The remote: a stage with what is lit, and panels of what can be done.
+// The remote's page: the live image, and panels with controls.
 import { by_id, h, icon } from "/dom.js";
 import { make_light } from "/light.js";
 import { make_looks } from "/looks.js";
@@ -17,8 +17,8 @@ const k_tabs = [
 ];
 
 const session = begin_session({
-  purpose: "The PIN stands in the operator's window, or in its QR code.",
-  name_hint: "so that others see whose edit it was",
+  purpose: "Type the PIN that the operator's window shows, or scan its QR code.",
+  name_hint: "others see it beside your changes",
   on_state: (state) => {
     for (const panel of panels) panel.show(state);
     if (!performance.getEntriesByName("ready").length) performance.mark("ready");
@@ -53,7 +53,7 @@ for (const [name, label] of k_tabs)
     ),
   );
 choose_tab("parts");
-// On a desk the looks are always there and have no tab.
+// On a desktop screen the looks are always visible and have no tab.
 const desk = matchMedia("(min-width: 1280px) and (min-height: 720px)");
 desk.addEventListener("change", () => desk.matches && document.body.dataset.tab === "looks" && choose_tab("parts"));
 if (navigator.serviceWorker) navigator.serviceWorker.register("/service-worker.js").catch(() => {});

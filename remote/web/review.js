@@ -1,4 +1,4 @@
-// Looks to talk about: pictures, the assembly in 3D, comments pinned to a look and a part, and a contact sheet when printed.
+// The review page: images of looks, the parts in 3D, comments on looks and parts; printed, it is a contact sheet.
 import { make_comments } from "/comments.js";
 import { by_id, h, keep, set_text } from "/dom.js";
 import { read_glb } from "/glb.js";
@@ -9,8 +9,8 @@ import { View3d } from "/view3d.js";
 
 const saves = new Saves();
 const session = begin_session({
-  purpose: "To see the looks: the PIN stands in the operator's window, or in its QR code.",
-  name_hint: "so that others see whose comment it is",
+  purpose: "To see the looks, type the PIN that the operator's window shows, or scan its QR code.",
+  name_hint: "others see it beside your comments",
   on_state: show,
 });
 const solid = by_id("solid");
@@ -43,7 +43,7 @@ function make_card(look) {
   return node;
 }
 
-const rest = make_comments(session, () => ({ look: "", slot: "" }), "Comment on all of it");
+const rest = make_comments(session, () => ({ look: "", slot: "" }), "General comment");
 by_id("all").append(rest);
 
 function show(state) {
@@ -71,7 +71,7 @@ async function open_solid(look) {
     view.show([]);
     const answer = await fetch(`/look/${encodeURIComponent(look)}.glb`, { cache: "no-store" });
     if (!answer.ok)
-      throw new Error((await answer.json().catch(() => ({}))).error ?? `Limn could not give it (${answer.status}).`);
+      throw new Error((await answer.json().catch(() => ({}))).error ?? `Limn could not send the look (${answer.status}). Try again.`);
     const meshes = await read_glb(await answer.arrayBuffer());
     view.show(meshes);
     const parts = session.state.slots
@@ -90,7 +90,7 @@ async function open_solid(look) {
         ),
     );
     mark("");
-    set_text(by_id("solid-why"), "Drag, two fingers, or the arrow keys.");
+    set_text(by_id("solid-why"), "Turn it by dragging or with the arrow keys; zoom with two fingers.");
   } catch (reason) {
     set_text(by_id("solid-why"), reason.message);
   }

@@ -1,9 +1,9 @@
-// Who and what is there: tracking, devices, people, comments, what the session had to say.
+// The panel Room: tracking, devices, people, comments, messages of the session.
 import { make_comments } from "/comments.js";
 import { by_id, h, keep, set_text } from "/dom.js";
 import { sight_badge } from "/parts.js";
 
-const k_most_notes = 20; // the newest ones
+const k_most_notes = 20; // only the newest are shown
 
 function row(name) {
   const badge = sight_badge(),
@@ -16,13 +16,13 @@ function row(name) {
   return node;
 }
 
-// The link for those who only look; by the device's own way to share, or into the clipboard.
+// Shares the link to the review page with the device's share dialog, or copies it to the clipboard.
 async function share(session) {
   const url = `${location.origin}/review`;
   try {
     if (navigator.share) return await navigator.share({ title: "Limn: looks", url });
     await navigator.clipboard.writeText(url);
-    session.say("The link to the looks is in the clipboard. It asks for a PIN.");
+    session.say("The link to the looks was copied. Opening it needs a PIN.");
   } catch (reason) {
     if (reason.name !== "AbortError") session.say(`The looks are at ${url}`);
   }
@@ -32,11 +32,11 @@ export function make_room(session) {
   const tracking = h("ul", { class: "rows" }),
     devices = h("ul", { class: "rows" }),
     people = h("ul", { class: "rows" });
-  const no_devices = h("p", { class: "soft small" }, "No devices are watched.");
+  const no_devices = h("p", { class: "soft small" }, "No devices are monitored.");
   const notes = h("ul", { class: "messages small" });
   const no_notes = h("p", { class: "soft small" }, "Nothing to report.");
-  const comments = make_comments(session, () => ({ look: session.state.look, slot: "" }), "Comment on all of it");
-  const repair_words = h("span", {}, "Repair what has moved");
+  const comments = make_comments(session, () => ({ look: session.state.look, slot: "" }), "General comment");
+  const repair_words = h("span", {}, "Repair: recalibrate moved devices");
   const repair = session.button("repair", { class: "wide" }, repair_words);
   const leave = h("button", { type: "button", class: "wide", onclick: () => session.link.leave() }, "Leave");
   const link = h("button", { type: "button", class: "wide", onclick: () => share(session) }, "Share the looks");
@@ -87,7 +87,7 @@ export function make_room(session) {
         (guest) => h("li", {}, h("b", {}, guest.name || "Guest"), h("span", { class: "soft small" }, guest.role)),
       );
       repair.disabled = state.repair !== "";
-      set_text(repair_words, state.repair ? `Repair: ${state.repair}` : "Repair what has moved");
+      set_text(repair_words, state.repair ? `Repair: ${state.repair}` : "Repair: recalibrate moved devices");
       comments.show(state.comments);
       keep(
         notes,

@@ -1,4 +1,4 @@
-// Makes the page a web app; keeps nothing. Without Limn it says so instead of the browser's own page.
+// Makes the page installable as a web app. It caches nothing; while Limn cannot be reached it shows a page that says so.
 const k_words = `<!doctype html><html lang="en"><meta charset="utf-8"><title>Limn</title>
 <meta name="viewport" content="width=device-width"><meta name="color-scheme" content="dark">
 <body bgcolor="#0b0b0d" text="#edeae4"><center><font face="system-ui"><br><br><h1>Limn is not there</h1>

@@ -1,20 +1,20 @@
-// What both pages share: the link, pairing, the words about the connection, edits and what came of them.
+// Shared by both pages: the connection, pairing, messages about the connection, edits and their results.
 import { role_of, take_actions } from "/actions.js";
 import { by_id, h, icon, set_text } from "/dom.js";
 import { Link } from "/link.js";
 import { prepare_pairing, tell_pairing } from "/pairing.js";
 
-const k_roles = ["look", "work", "operate"]; // each may what the ones before it may
+const k_roles = ["look", "work", "operate"]; // each has the permissions of those before it
 
 /**
- * `on_state(state)` hears each state, `on_hello(message)` each new connection; `purpose` and `name_hint` are words of the
- * pairing form.
+ * `on_state(state)` is called for each state, `on_hello(message)` for each new connection; `purpose` and `name_hint` are texts of
+ * the pairing form.
  */
 export function begin_session({ on_state, on_hello, purpose, name_hint }) {
   const link = new Link();
   const session = { link, state: null };
 
-  /** Tells the person something; `is_bad` interrupts a screen reader. */
+  /** Shows a message to the person; with `is_bad` a screen reader reads it at once. */
   session.say = (text, is_bad = false) => {
     const note = h(
       "div",
@@ -32,7 +32,7 @@ export function begin_session({ on_state, on_hello, purpose, name_hint }) {
     setTimeout(() => note.remove(), is_bad ? 9000 : 5000);
   };
 
-  /** Does an action; a refusal is told to the person. True when it was done. */
+  /** Triggers an action; shows the reason if it is refused. Returns whether it was done. */
   session.act = async (action, slot, value, button) => {
     button?.setAttribute("aria-busy", "true");
     try {
@@ -46,7 +46,10 @@ export function begin_session({ on_state, on_hello, purpose, name_hint }) {
     }
   };
 
-  /** A button that does an action; `value` may be a function. A role that may not is not shown it; with data-stays it is, disabled. */
+  /**
+   * A button that triggers an action; `value` may be a function. It is hidden from roles that may not use it; with data-stays it is
+   * shown, but disabled.
+   */
   session.button = (action, { slot, value, ...properties }, ...children) => {
     const button = h(
       "button",
@@ -82,7 +85,7 @@ export function begin_session({ on_state, on_hello, purpose, name_hint }) {
 function fit_role(node, role) {
   if (node.dataset.stays === undefined) return;
   node.disabled = k_roles.indexOf(role) < k_roles.indexOf(node.dataset.needs);
-  node.title = node.disabled ? `Needs the PIN to ${node.dataset.needs}` : "";
+  node.title = node.disabled ? `Needs the PIN for ${node.dataset.needs}` : "";
 }
 
 const k_words = { connecting: "Connecting …", waiting: "No connection. Trying again …" };

@@ -1,4 +1,4 @@
-// What parts are made of and in which light they stand: sliders that act when they are let go.
+// Material of parts and room light: sliders that act when they are released.
 import { h } from "/dom.js";
 
 function slider(label, properties) {
@@ -9,8 +9,8 @@ function slider(label, properties) {
 const share = (label, title, value) => slider(label, { title, min: "0", max: "1", step: "0.05", value });
 
 /**
- * What is let go of is sent. Returned is how the inputs follow what the session has: its words, in the inputs' order, where
- * `-` or nothing at all means how they stood at first.
+ * Calls `send` when an input is released. Returns a function that sets the inputs to the session's text: one word for each input,
+ * in their order, where `-` or a missing word means the initial value.
  */
 function let_go(inputs, send) {
   const first = inputs.map((input) => input.value);
@@ -30,7 +30,7 @@ function let_go(inputs, send) {
   };
 }
 
-/** A part's colour, metalness and roughness, instead of what its file says. */
+/** Controls for a part's material override: colour, metalness and roughness. */
 export function make_material(session, slot) {
   const colour = h("input", { type: "color", value: "#808080", "aria-label": `Colour of ${slot.name}` });
   const metal = share(`Metalness of ${slot.name}`, "Metal", "0"),
@@ -44,13 +44,13 @@ export function make_material(session, slot) {
     h("div", { class: "line named" }, h("span", { class: "soft" }, "Colour"), colour),
     metal.row,
     rough.row,
-    session.button("material", { slot: slot.name, class: "wide" }, "As its file says"),
+    session.button("material", { slot: slot.name, class: "wide" }, "Use the file's material"),
   );
   node.show = (state_of) => follow(state_of.material);
   return node;
 }
 
-/** The light that parts are shaded by, instead of the scene's own. */
+/** Controls for the room light that parts are shaded with, instead of the scene's own. */
 export function make_shading(session) {
   const strength = { min: "0", max: "2", step: "0.05" };
   const lights = [
@@ -70,7 +70,7 @@ export function make_shading(session) {
     { class: "stack", "data-needs": "work" },
     h("h3", {}, "Light on the parts"),
     ...lights.map(({ row }) => row),
-    session.button("light", { class: "wide" }, "The scene's own light"),
+    session.button("light", { class: "wide" }, "Use the scene's own light"),
   );
   node.show = (state) => state.light !== "other" && follow(state.light);
   return node;

@@ -1,11 +1,11 @@
-// The live composite, what holds it back, the last edit, and the two switches that must always be at hand.
+// The live image with its status, the last edit, and the switches Freeze and Blackout, which are always visible.
 import { in_words } from "/actions.js";
 import { by_id, icon, set_text } from "/dom.js";
 import { draw_picture } from "/pictures.js";
 
-const k_again_ms = 500; // until the room is asked for again when it has no picture
+const k_again_ms = 500; // pause before the next request when there is no image of the room
 
-/** A switch that does an on_off action and shows whether it is on. */
+/** A switch for an on_off action; it shows whether it is on. */
 export function make_switch(session, action, is_on, ...children) {
   const button = session.button(
     action,
@@ -26,30 +26,30 @@ export function make_stage(session) {
   document.addEventListener("visibilitychange", want);
   want();
 
-  let room_why = ""; // there is no picture of the room
+  let room_why = ""; // why there is no image of the room; empty: there is one
 
   session.link.addEventListener("picture", async ({ detail }) => {
     const seen = () => session.link.send({ type: "seen", picture: detail.number });
-    room_why = detail.jpeg.size ? "" : detail.json.why || "There is no picture of the room.";
+    room_why = detail.jpeg.size ? "" : detail.json.why || "There is no image of the room.";
     stage.say_why();
     if (room_why) return setTimeout(seen, k_again_ms);
     try {
       draw_picture(room, await createImageBitmap(detail.jpeg));
       room.dataset.picture = detail.number;
     } catch {
-      // A picture that is broken is passed over: the next one comes.
+      // A broken image is skipped; the next one will come.
     }
     seen();
   });
 
   const why = (state) => {
-    if (session.link.status !== "connected") return "No connection: this picture stands still";
+    if (session.link.status !== "connected") return "No connection: this image is not live";
     if (state?.blackout) return "Blackout: the projectors give no light";
     if (state?.frozen) return "Frozen: what is shown stays as it is";
     return room_why;
   };
   const stage = {
-    /** Words over the picture that come before the stage's own; empty: none. */
+    /** Text over the image that replaces the stage's own text; empty: none. */
     words: "",
     show(state) {
       blackout.show(state);
@@ -60,7 +60,7 @@ export function make_stage(session) {
     say_why() {
       set_text(by_id("view-why"), stage.words || why(session.state));
     },
-    /** While the window has its own picture the room's is neither asked for nor shown. */
+    /** While the window shows its own image, the room's is neither requested nor shown. */
     give_to_window(is_given) {
       is_hidden_by_window = is_given;
       room.hidden = is_given;

@@ -1,4 +1,4 @@
-// An assembly to turn in the hand: WebGL 2, drawn when something moved.
+// An interactive 3D view of the parts in WebGL 2; it is drawn only after a change.
 import { product } from "/glb.js";
 
 const k_vertex = `#version 300 es
@@ -68,7 +68,7 @@ function upload(gl, mesh) {
   return { ...mesh, array, count: mesh.indices.length, texture: texture_of(gl, mesh.texture) };
 }
 
-// A texture of a picture, or of one white pixel.
+// Makes a texture from an image, or from one white pixel.
 function texture_of(gl, picture) {
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -132,7 +132,7 @@ function perspective(aspect, near, far) {
   ]);
 }
 
-/** A view of meshes in a canvas: dragging, two fingers, the wheel and keys turn it and come nearer. Throws where there is no WebGL 2. */
+/** A 3D view of meshes in a canvas; turned and zoomed by dragging, two fingers, the wheel and keys. Throws without WebGL 2. */
 export class View3d {
   #gl;
   #program;
@@ -141,7 +141,7 @@ export class View3d {
   #box = { centre: [0, 0, 0], radius: 1 };
   #yaw = 0.6;
   #pitch = 0.35;
-  #near = 1; // nearer: more than 1
+  #near = 1; // zoom factor; above 1 is nearer
   #fingers = new Map();
   #is_due = false;
   #marked = "";
@@ -149,7 +149,7 @@ export class View3d {
   constructor(canvas) {
     this.#canvas = canvas;
     this.#gl = canvas.getContext("webgl2", { antialias: true });
-    if (!this.#gl) throw new Error("This browser has no WebGL 2: looks are shown as pictures alone.");
+    if (!this.#gl) throw new Error("This browser has no WebGL 2. Looks are shown as images only.");
     this.#program = program_of(this.#gl);
     new ResizeObserver(() => this.#due()).observe(canvas);
     this.#listen();
@@ -165,7 +165,7 @@ export class View3d {
     this.#due();
   }
 
-  /** Lights up the meshes of a name; empty: none. */
+  /** Highlights the meshes of this name; empty: none. */
   mark(name) {
     this.#marked = name;
     this.#due();

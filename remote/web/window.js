@@ -1,19 +1,19 @@
-// The window: this device's camera looks at the prototype, and Limn returns each of its frames with the parts in it. One frame is
-// in flight; what is shown is always a returned frame, so part and picture cannot slide apart.
+// The window (tablet view): frames of this device's camera are sent to Limn, which returns them with the parts drawn in. Only one
+// frame is in flight. The page shows only returned frames, so parts and camera image always belong together.
 import { by_id, h, icon, set_text } from "/dom.js";
 import { draw_picture } from "/pictures.js";
 
-const k_widths = [320, 480, 640, 800, 960, 1280]; // heights are whole at 4:3, 16:9 and 16:10
-const k_first = 2; // index of the width to begin with
+const k_widths = [320, 480, 640, 800, 960, 1280]; // give whole heights at 4:3, 16:9 and 16:10
+const k_first = 2; // index of the first width
 const k_slow_ms = 160,
-  k_fast_ms = 80; // from a frame's grab to its answer; above: smaller frames, below: larger
-const k_trials = 8; // answers before the width may change again
+  k_fast_ms = 80; // limits of the time from grab to answer: frames get smaller above k_slow_ms, larger below k_fast_ms
+const k_trials = 8; // number of answers before the width may change again
 const k_quality = [0.6, 0.7, 0.75, 0.75, 0.8, 0.8];
-const k_lost_ms = 4000; // a frame that is not answered by then is given up
+const k_lost_ms = 4000; // a frame without an answer after this time is given up
 
 const k_parts = [
   ["screen", "As the screen"],
-  ["rest", "What light lacks"],
+  ["rest", "Not projected"],
   ["full", "Whole parts"],
 ];
 
@@ -22,10 +22,10 @@ const k_refusals = {
     "The camera was refused. Allow it for this page in the browser's settings, then open the window again.",
   NotFoundError: "This device has no camera.",
   NotReadableError: "Another program uses the camera. Close it, then open the window again.",
-  OverconstrainedError: "This device has no camera that fits.",
+  OverconstrainedError: "This device has no suitable camera.",
 };
 
-// The lens belongs to a camera, and to the way the device is held: one name for each, made once and kept.
+// A lens belongs to one camera in one orientation of the device; each has a name that is made once and stored.
 function device_name(camera, is_upright) {
   const key = `limn.device ${camera} ${is_upright ? "upright" : "lying"}`;
   const kept = localStorage.getItem(key);
@@ -36,7 +36,7 @@ function device_name(camera, is_upright) {
   return name;
 }
 
-/** How wide a frame is sent: by how long the last ones took, and how much of that was Limn's. */
+/** Chooses the width of frames from how long the last ones took, and how much of that time was Limn's. */
 export class Pace {
   #at = k_first;
   #since = 0;
@@ -52,12 +52,13 @@ export class Pace {
     this.mean_ms = this.mean_ms ? 0.8 * this.mean_ms + 0.2 * ms : ms;
     this.#limn_ms = this.#limn_ms ? 0.8 * this.#limn_ms + 0.2 * limn_ms : limn_ms;
     if (++this.#since < k_trials) return;
-    // A busy Limn is not helped by frames in which markers are too small; a slow link is.
+    // Smaller frames help when the network is slow. When Limn is slow, the width does not shrink below the first one, because
+    // markers would become too small.
     const may_shrink = this.#at > k_first || this.#limn_ms < this.mean_ms / 2;
     const step = this.mean_ms > k_slow_ms && may_shrink ? -1 : this.mean_ms < k_fast_ms ? 1 : 0;
     const at = Math.min(Math.max(this.#at + step, 0), k_widths.length - 1);
     if (at === this.#at) return;
-    // Time goes with the pixels, about: what is expected of the new width.
+    // The time is roughly proportional to the number of pixels.
     const scale = (k_widths[at] / k_widths[this.#at]) ** 2;
     this.mean_ms *= scale;
     this.#limn_ms *= scale;
@@ -78,15 +79,15 @@ class CameraWindow {
   #number = 0;
   #in_flight = null; // {number, at, timer}
   #device = "";
-  #times = []; // of the last answers, ms
+  #times = []; // times of the last answers, ms
   #lock = null;
-  #announced = ""; // what was said of the window last
+  #announced = ""; // the last announced device and choice of parts
   parts = localStorage.getItem("limn.window.parts") ?? "screen";
 
   constructor(session, stage) {
     this.#session = session;
     this.#stage = stage;
-    by_id("view").append(this.#video); // some browsers give no frames of a video that is nowhere
+    by_id("view").append(this.#video); // some browsers give no frames of a video outside the document
     const { link } = session;
     link.addEventListener("answer", ({ detail }) => this.#answer(detail));
     link.addEventListener("hello", () => this.#resume());
@@ -105,7 +106,7 @@ class CameraWindow {
   async open() {
     if (this.is_open) return;
     if (!isSecureContext || !navigator.mediaDevices)
-      return this.#fail("A browser opens the camera on https alone. Use the https address that Limn shows.");
+      return this.#fail("Browsers allow the camera only with https. Use the https address that Limn shows.");
     try {
       this.#stream = await navigator.mediaDevices.getUserMedia({
         video: { facingMode: { ideal: "environment" }, width: { ideal: 1280 }, height: { ideal: 960 } },
@@ -162,13 +163,13 @@ class CameraWindow {
     this.#send();
   }
 
-  /** What this window draws of the parts: screen, rest or full. */
+  /** Chooses how this window draws the parts: screen, rest or full. */
   choose_parts(parts) {
     this.parts = parts;
     localStorage.setItem("limn.window.parts", parts);
   }
 
-  // Tells Limn whose lens the frames have and what is to be drawn, when the camera, the way it is held or that changed.
+  // Sends Limn the name of the lens and the choice of parts, if the camera, its orientation or the choice has changed.
   #announce(width, height) {
     const settings = this.#stream.getVideoTracks()[0].getSettings();
     const device = device_name(settings.deviceId ?? "camera", height > width);
@@ -206,7 +207,7 @@ class CameraWindow {
     }, k_lost_ms);
   }
 
-  // An answer to another frame than the one in flight is of one that was given up: it is never shown.
+  // An answer to another frame than the one in flight belongs to a frame that was given up; it is never shown.
   async #answer({ number, json, jpeg }) {
     const frame = this.#in_flight;
     if (!this.is_open || frame?.number !== number) return;
@@ -233,14 +234,14 @@ class CameraWindow {
       this.#send();
     };
     this.#video.requestVideoFrameCallback(send);
-    setTimeout(send, 100); // a camera that stands still gives no frame
+    setTimeout(send, 100); // a stopped camera gives no frame
   }
 
   async #show(jpeg, number) {
     try {
       draw_picture(this.#shown, await createImageBitmap(jpeg));
     } catch {
-      this.#session.say(`The picture of frame ${number} could not be read.`, true);
+      this.#session.say(`The image of frame ${number} could not be read.`, true);
     }
   }
 
@@ -254,7 +255,7 @@ class CameraWindow {
     const focal = json.lens?.values?.[0];
     if (focal)
       lines.push(
-        `lens ${focal.toFixed(0)} ± ${json.lens.focal_stddev_px.toFixed(1)} px of ${json.lens.frames} frames`,
+        `focal ${focal.toFixed(0)} ± ${json.lens.focal_stddev_px.toFixed(1)} px, ${json.lens.frames} frames`,
       );
     const numbers = by_id("window-numbers");
     set_text(numbers, lines.join("\n"));
@@ -262,7 +263,7 @@ class CameraWindow {
   }
 }
 
-// Whether view parts are drawn for this device's eye.
+// A switch that makes this device the viewer that `view` parts are drawn for.
 function make_follow(session) {
   const is_on = (state) => state.viewer === session.link.name;
   const words = h("small", {});
@@ -275,18 +276,18 @@ function make_follow(session) {
       value: () => (is_on(session.state) ? "" : session.link.name),
     },
     icon("window"),
-    h("span", {}, "Light for this eye", words),
+    h("span", {}, "Light for this device", words),
   );
   button.show = (state) => {
     button.setAttribute("aria-checked", String(is_on(state)));
     const waits = state.follows !== state.viewer;
     const on = waits ? "waits until this device sees markers" : "view parts are drawn for this device";
-    set_text(words, is_on(state) ? on : "have view parts drawn for this device");
+    set_text(words, is_on(state) ? on : "draw view parts for this device");
   };
   return button;
 }
 
-// What the window draws of the parts: this guest's own choice.
+// The guest's choice of how the window draws the parts.
 function make_parts_choice(owner) {
   const buttons = k_parts.map(([value, label]) =>
     h(
@@ -314,7 +315,7 @@ function make_panel(owner, session) {
   const words = h(
     "p",
     { class: "soft" },
-    "Hold this device before the prototype: its camera's picture comes back with the parts in it.",
+    "Point this device's camera at the prototype: its image is shown with the parts in it.",
   );
   const open = h(
     "button",

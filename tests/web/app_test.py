@@ -1,4 +1,4 @@
-"""The remote as an app on a network: a Chromium that trusts limn.crt warns of nothing and would install the page.
+"""The remote as an app on a network: a Chromium that trusts limn.crt shows no warning and can install the page.
 
     app_test.py --limn build/release/limn --out FOLDER
 """
@@ -20,7 +20,7 @@ SKIPPED = 77
 
 
 def own_address():
-    """An address that other machines reach this one by; None: it has none."""
+    """An address at which other machines can reach this one; None if it has none."""
     with contextlib.closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as asked:
         try:
             asked.connect(("192.0.2.1", 9))  # sends nothing
@@ -31,14 +31,14 @@ def own_address():
 
 
 def authority_of(url):
-    """What a device downloads, before it trusts anything."""
+    """Downloads the authority's certificate without checking the server's."""
     with urllib.request.urlopen(url + "/limn.crt", context=ssl._create_unverified_context(), timeout=20) as answer:
         expect(answer.headers["Content-Type"] == "application/x-x509-ca-cert", "a certificate", answer.headers["Content-Type"])
         return answer.read()
 
 
 def trust(certificate, home):
-    """What a person does in the device's settings."""
+    """Installs a certificate, as a person does in the device's settings."""
     store, file = os.path.join(home, ".pki", "nssdb"), os.path.join(home, "limn.crt")
     os.makedirs(store)
     with open(file, "wb") as out:
@@ -75,7 +75,7 @@ def main():
     options = parser.parse_args()
     address = own_address()
     if not address:
-        print("skipped: no address but the loopback's")
+        print("skipped: this machine has only the loopback address")
         return SKIPPED
     shutil.rmtree(options.out, ignore_errors=True)
     home, stranger, config = (os.path.join(options.out, name) for name in ("home", "stranger", "config"))
@@ -83,7 +83,7 @@ def main():
         os.makedirs(folder)
     with contextlib.closing(Live(options.limn, options.out, f"{address}:0", config)) as live:
         expect(live.url.startswith("https://"), "https", live.url)
-        expect(is_warned_of(live.url, stranger), "a warning by a browser that does not trust it", "none")
+        expect(is_warned_of(live.url, stranger), "a warning by a browser that does not trust the authority", "none")
         trust(authority_of(live.url), home)
         check_app(live.url, home, options.out)
     print("passed")

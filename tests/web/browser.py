@@ -10,17 +10,17 @@ import time
 import urllib.error
 import urllib.request
 
-WAIT_S = 60.0  # for a condition: long, for a machine that does other work; a test that passes does not wait for it
-ENTER, ESCAPE, TAB = "\ue007", "\ue00c", "\ue004"  # as WebDriver has them
+WAIT_S = 60.0  # longest wait for a condition; long because the machine may be busy; a test that passes does not wait for it
+ENTER, ESCAPE, TAB = "\ue007", "\ue00c", "\ue004"  # WebDriver's codes
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
 
 
 class Failed(Exception):
-    """What was expected and what was found."""
+    """A failed check: says what was expected and what was found."""
 
 
 def wait_for(what, condition, timeout_s=WAIT_S):
-    """condition() as soon as it is true. Fails, with `what` in words, when it does not become so."""
+    """Returns condition() as soon as it is true. Fails with the description `what` if it does not become true in time."""
     until = time.monotonic() + timeout_s
     while True:
         found = condition()
@@ -32,10 +32,10 @@ def wait_for(what, condition, timeout_s=WAIT_S):
 
 
 class Driver:
-    """chromedriver, and the pages that it has opened."""
+    """A running chromedriver."""
 
     def __init__(self, home=None):
-        """`home`: of the browsers, instead of one's own."""
+        """`home`: home folder of the browsers, instead of the user's own."""
         environment = os.environ | ({"HOME": home} if home else {})
         self.process = subprocess.Popen(["chromedriver", "--port=0"], env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                         text=True)
@@ -51,10 +51,10 @@ class Driver:
 
 
 class Browser:
-    """One Chromium with a profile of its own."""
+    """One Chromium with its own profile."""
 
     def __init__(self, driver, camera=None, arguments=(), believes_all=True):
-        """`believes_all`: certificates."""
+        """`believes_all`: accept all certificates."""
         self.driver = driver
         self.profile = tempfile.mkdtemp(prefix="limn-web-")
         arguments = ["--headless=new", "--disable-gpu", "--enable-unsafe-swiftshader", "--hide-scrollbars", "--no-first-run",
@@ -86,7 +86,7 @@ class Browser:
             raise Failed(json.load(refusal)["value"]["message"].splitlines()[0]) from None
 
     def settle(self):
-        """Waits until what was changed is on the screen."""
+        """Waits until changes are on the screen and animations have ended."""
         self.script_async("await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));"
                           "await Promise.all(document.getAnimations().map((animation) => animation.finished));")
 
@@ -94,11 +94,11 @@ class Browser:
         self._call("POST", self.session + "/url", {"url": url})
 
     def script(self, code, *arguments):
-        """What the function body `code` returns."""
+        """Runs the function body `code` and returns its result."""
         return self._call("POST", self.session + "/execute/sync", {"script": code, "args": list(arguments)})
 
     def script_async(self, code, *arguments):
-        """What the function body `code`, of an async function, comes to."""
+        """Runs `code` as the body of an async function and returns its result."""
         wrapped = f"""
             const done = arguments[arguments.length - 1], given = [...arguments].slice(0, -1);
             (async (...args) => {{ {code} }})(...given).then((value) => done({{ value }}), (error) => done({{ error: String(error) }}));"""
@@ -116,7 +116,7 @@ class Browser:
         return [element[ELEMENT] for element in found]
 
     def click(self, selector):
-        """Clicks, as a person does, the one visible element of a selector."""
+        """Clicks the first visible element of a selector, as a person would."""
         found = wait_for(f"something to click at {selector}", lambda: [e for e in self.find(selector) if self.is_shown(e)])
         self._call("POST", f"{self.session}/element/{found[0]}/click")
 
@@ -124,7 +124,7 @@ class Browser:
         try:
             return self._call("GET", f"{self.session}/element/{element}/displayed")
         except Failed:
-            return False  # gone meanwhile
+            return False  # the element was removed meanwhile
 
     def type(self, selector, text):
         element = wait_for(f"something to type into at {selector}", lambda: self.find(selector))[0]
@@ -139,7 +139,7 @@ class Browser:
         return self.script("return document.querySelector(arguments[0])?.textContent ?? ''", selector)
 
     def log(self, kind):
-        """What was logged since the last call: kind "browser" (console) or "performance" (DevTools events)."""
+        """Entries logged since the last call: kind "browser" (console) or "performance" (DevTools events)."""
         return self._call("POST", self.session + "/se/log", {"type": kind})
 
     def resize(self, width, height, is_phone=False):

@@ -1,6 +1,6 @@
-// web_film FOLDER: what somebody's tablet sees who looks round the virtual rig of `limn live`, for a
-// browser's camera. Writes tablet.mjpeg (each view for 0.2 s), the views NN.jpg and, white in NN-parts.png,
-// where the mirror is in them in truth.
+// web_film FOLDER: images of a tablet that is moved around the virtual rig of `limn live`, used as a
+// browser's camera. Writes tablet.mjpeg (each view for 0.2 s), the views NN.jpg, and NN-parts.png, the true
+// mask of the mirror in each view.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -26,7 +26,7 @@ using namespace limn;
 constexpr int k_views = 8, k_images_a_view = 6, k_width = 640, k_height = 480;
 constexpr double k_fov_deg = 65;
 
-// Round the prototype, 0.65 to 0.8 m away, up to 35 degrees to the side.
+// The tablet's camera: it moves around the prototype, 0.65 to 0.8 m away, up to 35 degrees to the side.
 Imager tablet(const sim::World& world, int view) {
   const double turn = 2 * std::numbers::pi * view / k_views;
   const double side = 0.6 * std::sin(turn), height = 0.3 * std::cos(2 * turn),
@@ -66,7 +66,7 @@ int main(int argc, char** argv) {
   }
   sim::World world = std::move(*loaded);
   scene::PosedScene parts = sim::true_poses(world);
-  // What is on the surface is lit by projectors: a window does not draw it.
+  // Parts on the surface are shown by projectors, so the window does not draw them.
   std::erase_if(parts.parts, [](const scene::PosedPart& part) { return part.slot != "mirror"; });
   world.rig.projectors.clear();  // dark
   world.projector_effects.clear();

@@ -1,8 +1,8 @@
-// Runs in each page before its own code. Remembers what the WebSocket carried, and answers the test's questions about the page
-// as functions of window.limn_test.
+// Runs in each page before its own code. Records the WebSocket's messages, and offers measurements of the page to the tests as
+// functions of window.limn_test.
 (() => {
-  const k_kept = 12; // frames and answers of the window
-  const k_drawn = 12; // levels by which a part differs from what is behind it
+  const k_kept = 12; // number of recorded frames and answers of the window
+  const k_drawn = 12; // least difference, in levels, between a part and its background
   const frames = [],
     answers = [],
     states = [],
@@ -34,7 +34,7 @@
   const controls = () => all("button, a[href], select, input").filter((node) => !node.disabled);
   const in_words = (node) => node.outerHTML.slice(0, 120);
 
-  // WCAG: how much light a colour gives, from 0.05 to 1.05.
+  // Relative luminance of a colour as in WCAG, plus 0.05: from 0.05 to 1.05.
   const linear = (v) => (v <= 10 ? v / 3294.6 : ((v / 255 + 0.055) / 1.055) ** 2.4);
   const light = ([r, g, b]) => 0.2126 * linear(r) + 0.7152 * linear(g) + 0.0722 * linear(b) + 0.05;
   const numbers = (text) => text.match(/[\d.]+/g).map(Number);
@@ -64,7 +64,7 @@
   const median = (values) => values.sort((x, y) => x - y)[values.length >> 1] ?? NaN;
   let film = [];
 
-  // Share of the pixels in either mask that are in both, the second one moved by (dx, dy).
+  // Intersection over union of two masks, the second one moved by (dx, dy).
   const overlap = (one, two, width, height, dx, dy) => {
     const margin = 8;
     let both = 0,
@@ -79,7 +79,7 @@
     return either ? both / either : 0;
   };
 
-  // How far, in pixels of the masks, one must be moved to lie on the other best: to a part of a pixel, by a parabola.
+  // Distance, in mask pixels, by which one mask must be moved for the best overlap; sub-pixel by fitting a parabola.
   const offset = (one, two, width, height) => {
     const shared = (dx, dy) => overlap(one, two, width, height, dx, dy);
     let [x, y, best] = [0, 0, 0];
@@ -93,7 +93,7 @@
   };
 
   window.limn_test = {
-    is_deaf: false, // the page hears nothing that comes over the WebSocket
+    is_deaf: false, // whether the page ignores messages from the WebSocket
     frames,
     answers,
     states,
@@ -104,7 +104,7 @@
         .filter((n) => !(n.getAttribute("aria-label") || n.textContent.trim() || n.labels?.length))
         .map(in_words),
 
-    // Controls that the Tab key has not come to since watch_focus().
+    // Starts to record the focus; missed() then lists the controls that the Tab key has not reached.
     watch_focus() {
       const seen = new Set();
       addEventListener("focusin", (event) => seen.add(event.target));
@@ -137,16 +137,16 @@
         .filter(([, one, two]) => Math.max(one, two) / Math.min(one, two) < least)
         .map(([words]) => words),
 
-    // A canvas, small and grey.
+    // A canvas as a small grey image.
     pixels: (selector) => small(document.querySelector(selector)),
 
-    // What a projector shows, likewise.
+    // A projector's image, likewise.
     async projector(name) {
       const answer = await fetch(`/picture/projector/${name}.jpg`);
       return small(await createImageBitmap(await answer.blob()));
     },
 
-    // `views`: each view's picture (JPEG) and where the part is in it (PNG), in base64.
+    // Stores the views of the film: each has an image (JPEG) and the mask of the part in it (PNG), in base64.
     async keep_film(views) {
       film = await Promise.all(
         views.map(async ({ picture, part }) => {
@@ -162,8 +162,8 @@
       );
     },
 
-    // Each answer's picture beside the frame of its number, and the part in it beside where it is in truth in the view that the
-    // frame shows. Counts, and medians over the answers.
+    // Compares each answer's image with the frame of its number, and the part drawn in it with the true mask of that view.
+    // Returns counts, and medians over the answers.
     async window_measured() {
       const window_picture = document.querySelector("#window-picture");
       const shown = { number: Number(window_picture.dataset.number), small: small(window_picture) };

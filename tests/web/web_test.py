@@ -2,8 +2,8 @@
 
     web_test.py --limn build/release/limn --film FILM --out FOLDER
 
-FILM is what web_film made: a virtual tablet's pictures and where the mirror is in them. Screenshots are written to
-FOLDER. Each check is a function; they follow one another in one session, as people's actions do.
+FILM is a folder written by web_film: a virtual tablet's images and masks of the mirror in them. Screenshots are written to
+FOLDER. Each check is a function; all checks run in order in one session.
 """
 
 import argparse
@@ -26,12 +26,12 @@ CONFIG = os.path.join(HERE, "..", "..", "config")
 PHONE, DESK = "phone", "desk"
 SIZES = {PHONE: (390, 844, True), "tablet": (820, 1180, True), "tablet-lying": (1180, 820, True), DESK: (1440, 900, False)}
 MOST_BYTES, MOST_READY_MS, MOST_HEARD_MS = 300_000, 1000, 200
-MOST_BESIDE_MM = 120  # of the mirror from the marker that carries it, each way
+MOST_BESIDE_MM = 120  # largest distance of the mirror from the marker that carries it, in each direction
 LEAST_TARGET_PX, LEAST_CONTRAST = 48, 4.5
-MOST_OFF_PX, LEAST_OVERLAP = 3.0, 0.6  # of the mirror in the window's pictures
+MOST_OFF_PX, LEAST_OVERLAP = 3.0, 0.6  # limits for the mirror in the window's images
 MIRROR = ".slot:first-child"
 BLACKOUT = "#stage-buttons [data-action=blackout]"
-LAID, LAID_AT_M = "aruco_4x4_50:9", [0.12, -0.03, 0.052]  # on the door; it carries nothing
+LAID, LAID_AT_M = "aruco_4x4_50:9", [0.12, -0.03, 0.052]  # on the door; it carries no part
 A4_IN = 8.27, 11.69
 
 
@@ -46,17 +46,17 @@ def expect(is_so, what, found=""):
 
 
 def with_laid_marker(world):
-    """The text of a world, and in it a marker on the prototype that the scene does not use."""
+    """A world's text, with an added marker on the prototype that the scene does not use."""
     place = {"rotation_wxyz": [-0.036792076, 0.999285831, -0.000316876, 0.008606471], "translation_m": LAID_AT_M}
     laid = json.dumps([{"name": LAID, "size_mm": 40, "prototype_from_marker": place}])
     return world.replace("{", '{"loose_markers": ' + laid + ",", 1)
 
 
 class Live:
-    """limn live --serve on the virtual rig, on a copy of its project: looks and comments are kept in it."""
+    """limn live --serve on the virtual rig. It works on a copy of the project, because looks and comments are stored in it."""
 
     def __init__(self, limn, folder, serve="0", config=None):
-        """`config`: where it keeps its certificate, instead of one's own folder."""
+        """`config`: folder for its certificate, instead of the user's own."""
         environment = os.environ | ({"XDG_CONFIG_HOME": config} if config else {})
         project = os.path.join(folder, "project")
         shutil.rmtree(project, ignore_errors=True)
@@ -100,10 +100,10 @@ class Checks:
         self.live, self.browser, self.film, self.out = live, browser, film, out
         self.measured = {}
 
-    # What all checks use.
+    # Used by all checks.
 
     def ask(self, question, *arguments):
-        """What a function of in_page.js answers."""
+        """Returns the answer of a function in in_page.js."""
         return self.browser.script_async(f"return limn_test.{question}(...args);", *arguments)
 
     def state(self):
@@ -113,7 +113,7 @@ class Checks:
         return self.state()["slots"][0]
 
     def edit(self, action, slot, value):
-        """As another program does it."""
+        """Sends an edit over HTTP, as another program would."""
         status = self.browser.script_async("""
             const [action, slot, value] = args, headers = { "Content-Type": "application/json" };
             const body = JSON.stringify({ action, slot, value });
@@ -130,7 +130,7 @@ class Checks:
         self.browser.click(f"#tabs [data-tab={name}]")
 
     def number_in(self, selector, name):
-        """A number in an element's data; -1: it has none yet."""
+        """A number in an element's data attribute; -1 if it has none yet."""
         return float(self.browser.script(
             "return document.querySelector(arguments[0])?.dataset[arguments[1]] ?? -1", selector, name))
 
@@ -156,7 +156,7 @@ class Checks:
     def the_page_is_light_and_asks_nobody_else(self):
         browser = self.browser
         browser.open("about:blank")
-        browser.log("performance")  # of the browser's own first page
+        browser.log("performance")  # discards the entries of the first page
         self.open("/")
         wait_for("a page to pair with",
                  lambda: browser.script("return performance.getEntriesByName('usable').length"))
@@ -192,7 +192,7 @@ class Checks:
         self.browser.type("[name=pin]", wrong)
         wait_for("words about the PIN", lambda: "not the PIN" in self.browser.text("#pairing-why"))
         expect(self.browser.script("return document.querySelector('#session').hidden"), "no session", "one")
-        self.browser.log("browser")  # the refusal stands there, rightly
+        self.browser.log("browser")  # discards the expected message about the refusal
 
     @check
     def the_pin_pairs_and_a_cold_page_is_ready_in_a_second(self):
@@ -221,7 +221,7 @@ class Checks:
         wait_for("another variant", lambda: self.mirror()["variant"] != was)
         wait_for("its name on the page",
                  lambda: self.browser.text(f"{MIRROR} .name .soft") == self.mirror()["variant"])
-        # The mirror's edge jitters by 15 levels with its marker, another mirror changes it by 130.
+        # The mirror's edge jitters by 15 levels with its marker; another variant changes the image by 130.
         after = wait_for("another picture of the projector", lambda: difference(before, now := shown()) > 60 and now)
         self.measured["projector_changed_by"] = round(difference(before, after))
         self.tab("light")
@@ -259,7 +259,7 @@ class Checks:
         browser.script("document.querySelectorAll('.slot .open[aria-expanded=false]').forEach((one) => one.click())")
         offered = set(browser.script("return [...document.querySelectorAll('[data-action]')].map((n) => n.dataset.action)"))
         expect(offered <= told, "actions that Limn tells", offered - told)
-        missing = told - offered - {"pair"}  # offered while a marker waits
+        missing = told - offered - {"pair"}  # it is offered only while a loose marker lies still
         expect(not missing, "something on the page for every action", missing)
 
     @check
@@ -290,7 +290,7 @@ class Checks:
         self.tab("light")
         shown = self.browser.script_async("""
             const state = await (await fetch("/api/state")).json();
-            state.outputs = [{ name: "wall", shows: "full" }, { name: "desk", shows: "rest" }];  // the virtual rig has none
+            state.outputs = [{ name: "wall", shows: "full" }, { name: "desk", shows: "rest" }];  // the virtual rig has no screens
             const data = JSON.stringify({ ...state, type: "state" });
             limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
             const choices = [...document.querySelectorAll("#light [data-output]")];
@@ -336,7 +336,7 @@ class Checks:
         try:
             bo.resize(*SIZES[PHONE])
             bo.cdp("Page.addScriptToEvaluateOnNewDocument", source=in_page())
-            bo.open(self.live.url + f"/#pin={self.live.pins['look']}")  # as from the QR code
+            bo.open(self.live.url + f"/#pin={self.live.pins['look']}")  # as after scanning the QR code
             bo.type("[name=name]", "Bo" + ENTER)
             wait_for("a state", lambda: bo.script("return document.body.dataset.number"))
             offered = bo.script("return [...document.querySelectorAll('[data-needs]')]"
@@ -351,7 +351,7 @@ class Checks:
         expect(min(times) <= MOST_HEARD_MS, f"an edit at all within {MOST_HEARD_MS} ms", times)
 
     def _heard_ms(self, bo, value):
-        """From Ann's click to the state at Bo's."""
+        """Time from Ann's click to the arrival of the state in Bo's browser."""
         before = bo.script("return Number(document.body.dataset.number)")
         clicked = self.browser.script("""
             const at = performance.timeOrigin + performance.now();
@@ -445,7 +445,7 @@ class Checks:
 
     @check
     def the_window_shows_the_mirror_in_the_frames_that_were_sent(self):
-        for slot in self.state()["slots"]:  # as in the film
+        for slot in self.state()["slots"]:  # as in the images of the film
             self.edit("choose_variant", slot["name"], slot["variants"][0])
             self.edit("release", slot["name"], "")
         self.ask("keep_film", self.film)
@@ -467,7 +467,7 @@ class Checks:
         wait_for("the switch to show it", lambda: self.is_marked("#window [data-action=viewer]", "aria-checked"))
         self.screenshots("following", [PHONE, "tablet"])
         self.size("tablet")
-        self.tab("light")  # which closes the window
+        self.tab("light")  # closes the window
         wait_for("the scene's own viewer meanwhile", lambda: self.state()["follows"] == "" and "sees no markers" in
                  self.browser.text("#light .choices [data-action=viewer][aria-pressed=true]"))
         self.screenshots("light-for", [PHONE, DESK])
@@ -507,7 +507,7 @@ class Checks:
             const state = await (await fetch("/api/state")).json();
             state.looks = ["evening", "noon", "dusk", "night", "dawn", "rain", "snow"];
             const data = JSON.stringify({ ...state, type: "state" });
-            limn_test.is_deaf = true;  // to what the session says of its one look
+            limn_test.is_deaf = true;  // ignores the session's own state, which has one look
             limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
             const [one, ...others] = document.querySelectorAll(".sheet-card canvas");
             for (const other of others) {
@@ -521,13 +521,13 @@ class Checks:
         with open(os.path.join(self.out, "looks.pdf"), "wb") as file:
             file.write(pdf)
         self.browser.script("limn_test.is_deaf = false")
-        self.browser.log("browser")  # that six of them have no picture at Limn's
-        # A picture that two pages share stands on both.
+        self.browser.log("browser")  # discards messages about six looks without an image
+        # An image that crosses a page break is drawn on both pages.
         pictures = [stream.count(b" Do\n") for stream in streams_of(pdf) if b" cm\n" in stream]
         expect(pictures == [6, 1], "six whole looks on a page, and the last on another", pictures)
 
     def _brightness(self):
-        """The 3D view's mean, of 1, as it is drawn anew."""
+        """Mean brightness (0 to 1) of the 3D view after it was drawn again."""
         return self.browser.script_async("""
             const canvas = document.querySelector("dialog canvas");
             for (const key of ["ArrowLeft", "ArrowRight"]) canvas.dispatchEvent(new KeyboardEvent("keydown", { key }));
@@ -574,7 +574,7 @@ class Checks:
 
 
 def streams_of(pdf):
-    """What the streams of a PDF say, as far as they are deflated."""
+    """The deflated streams of a PDF, decompressed."""
     found = []
     for stream in re.finditer(rb"stream\r?\n(.*?)endstream", pdf, re.DOTALL):
         with contextlib.suppress(zlib.error):
@@ -583,7 +583,7 @@ def streams_of(pdf):
 
 
 def read_film(folder):
-    """Each view's picture and where the mirror is in it, in base64."""
+    """Each view's image and the mask of the mirror in it, in base64."""
     def base64_of(path):
         with open(path, "rb") as file:
             return base64.b64encode(file.read()).decode()
