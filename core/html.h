@@ -5,10 +5,10 @@
 
 namespace limn {
 
-/// Text as HTML shows it.
+/// The text with HTML's special characters escaped.
 std::string escaped(const std::string& text);
 
-/// The image, made smaller where it is wider than `width` pixels.
+/// The image, made smaller if it is wider than `width` pixels.
 cv::Mat at_most_wide(const cv::Mat& image, int width);
 
 }  // namespace limn
