@@ -56,10 +56,9 @@ struct LeastSquaresSummary {
 /// - `double evaluate_trial()`: Makes the trial state by that step and returns its cost. A cost that is not
 ///   finite means that the step is impossible.
 /// - `void accept_trial()`: Makes the trial state the state.
-/// - `bool is_settled(trial)`: Says after each trial, accepted or not, whether it was the last. Good rules
-/// are
-///   that the step predicted almost no gain, or that it was accepted and gained almost nothing (Madsen,
-///   Nielsen, Tingleff 2004, section 3.2).
+/// - `bool is_settled(trial)`: Says after each trial, accepted or not, whether it was the last. Good rules:
+///   the step predicted almost no gain, or it was accepted and gained almost nothing (Madsen, Nielsen,
+///   Tingleff 2004, section 3.2).
 template <class Problem>
 concept LeastSquaresProblem = requires(Problem problem, double damping, const LeastSquaresTrial& trial) {
   { problem.cost() } -> std::convertible_to<double>;
