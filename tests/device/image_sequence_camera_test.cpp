@@ -24,7 +24,7 @@ TEST(ImageSequenceCamera, PlaysAFolderInTheOrderOfNamesAndEnds) {
   ASSERT_TRUE(camera) << camera.message();
   EXPECT_EQ(camera->size(), cv::Size(8, 6));
   EXPECT_TRUE(camera->is_finite());
-  EXPECT_EQ(camera->description(), "3 stored pictures, 8x6, 20 a second");
+  EXPECT_EQ(camera->description(), "3 stored images, 8x6, 20 per second");
   for (int i = 0; i < 3; ++i) {
     const auto frame = camera->next();
     ASSERT_TRUE(frame) << frame.message();

@@ -136,7 +136,7 @@ TEST(MjpegCamera, OldImagesThatWaitAreDropped) {
   EXPECT_EQ(value_of(*frame), 40);
   EXPECT_GE(seconds_between(last_sent, frame->captured_at), -k_clocks_apart_s);
   EXPECT_LT(frame->captured_at, read_at);
-  EXPECT_EQ(camera->description().find(" 0 pictures skipped"), std::string::npos) << camera->description();
+  EXPECT_EQ(camera->description().find(" 0 images skipped"), std::string::npos) << camera->description();
 }
 
 // A server that can be switched off while a client is there.

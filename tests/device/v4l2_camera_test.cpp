@@ -326,7 +326,7 @@ TEST(V4l2Camera, StampsThatCannotBeAreThoseOfReading) {
     EXPECT_GE(frame->captured_at, begun);
     EXPECT_LE(frame->captured_at, Clock::now());
   }
-  contains(camera->description(), "3 with a stamp that cannot be");
+  contains(camera->description(), "3 with an impossible stamp");
 }
 
 TEST(V4l2Camera, SensorSettingsAreLockedAndReadBack) {
@@ -387,7 +387,7 @@ TEST(V4l2Camera, ADriverThatLiesAboutItsFormatIsNamed) {
   contains(problem(&forgetful), "then says MJPG 64x40");
   Driver larger;  // the JPEG holds another size than the format says
   larger.last = mjpg(10, 80);
-  contains(problem(&larger), "expected a picture of 64x48, found 80x48");
+  contains(problem(&larger), "64x48, found 80x48");
 }
 
 TEST(V4l2Camera, FaultsAreNamedWithWhatToDo) {
@@ -404,7 +404,7 @@ TEST(V4l2Camera, FaultsAreNamedWithWhatToDo) {
   contains(refusing(VIDIOC_S_FMT, EBUSY), "setting its format fails");
   Driver metadata;
   metadata.capabilities = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING;
-  contains(problem(&metadata), "gives no pictures");
+  contains(problem(&metadata), "gives no images");
   Driver exotic;
   exotic.formats = {V4L2_PIX_FMT_H264};
   contains(problem(&exotic), "expected a camera with MJPG, YUYV or GREY, found H264");
