@@ -52,7 +52,7 @@ TEST(Devices, TheExampleIsReadAndFitsItsRig) {
   ASSERT_TRUE(fitted) << fitted.message();
   EXPECT_EQ(fitted->cameras[1].size, cv::Size(1280, 720));
   EXPECT_EQ(fitted->displays[1].size, cv::Size(1920, 1080));
-  EXPECT_EQ(fitted->displays[2].size, cv::Size(1920, 1080));  // its own
+  EXPECT_EQ(fitted->displays[2].size, cv::Size(1920, 1080));  // the size in the file
 }
 
 TEST(Devices, FilesAreNamedFromTheFilesFolder) {

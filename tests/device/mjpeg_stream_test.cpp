@@ -30,7 +30,7 @@ std::string chunked(const std::string& text, std::size_t size) {
 
 Stamp at(int ms) { return Stamp(std::chrono::milliseconds(ms)); }
 
-// Every image of the bytes when they come in pieces of `step`.
+// All images in the bytes when they arrive in pieces of `step` bytes.
 std::vector<std::string> images(const std::string& bytes, std::size_t step, Status* end = nullptr) {
   MjpegStream stream(k_limit);
   std::vector<std::string> found;
@@ -67,7 +67,7 @@ TEST(MjpegStream, OnlyTheNewestIsKeptAndItsFirstByteIsItsStamp) {
   MjpegStream stream(k_limit);
   ASSERT_TRUE(stream.feed(k_answer + part("old") + part("older still"), at(10)));
   const std::string last = part("newest");
-  ASSERT_TRUE(stream.feed(last.substr(0, last.size() - 8), at(20)));  // its header alone
+  ASSERT_TRUE(stream.feed(last.substr(0, last.size() - 8), at(20)));  // only the part's header
   ASSERT_TRUE(stream.feed(last.substr(last.size() - 8, 3), at(30)));
   EXPECT_EQ(stream.take_newest()->jpeg, "older still");
   EXPECT_FALSE(stream.has_part());
@@ -122,7 +122,7 @@ TEST(MjpegStream, ImagesBeforeAFaultAreGood) {
   EXPECT_FALSE(end);
 }
 
-// Bytes of the right kind in wrong places: every answer is an image or an error.
+// Streams with random damage: every result is an image or an error.
 TEST(MjpegStream, DamagedStreamsNeverBreakIt) {
   auto rng = test::test_rng();
   const std::string lengths = k_answer + part("first") + open_part("second") + part("third");
