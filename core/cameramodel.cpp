@@ -31,7 +31,7 @@ struct FreeModel {
 };
 using ModelPointer = std::unique_ptr<mrcal_cameramodel_t, FreeModel>;
 
-// mrcal says on stderr what it disliked: while this lives, that text is kept for our own message.
+// mrcal prints its errors to stderr. While this object exists, that text is captured for Limn's own message.
 class StderrCapture {
  public:
   StderrCapture() : lock_(mutex()), file_(std::tmpfile()) {
@@ -46,7 +46,7 @@ class StderrCapture {
   StderrCapture(const StderrCapture&) = delete;
   StderrCapture& operator=(const StderrCapture&) = delete;
 
-  // Last line written meanwhile.
+  // The last line that was printed.
   std::string text() {
     restore();
     if (!file_) return "";
@@ -89,13 +89,13 @@ ModelPointer to_mrcal(const Imager& imager) {
   return model;
 }
 
-// The text: a Python dictionary of strings, numbers and lists. Read by ourselves: mrcal's own reader takes
-// memory and stack as the file tells it to.
+// Reader of the text, a Python dictionary of strings, numbers and lists. Limn has its own because mrcal's
+// reader uses as much memory and stack as a damaged file demands.
 class ModelText {
  public:
   explicit ModelText(std::string_view text) : text_(text) {}
 
-  // Whether `mark` comes next; takes it.
+  // Whether `mark` comes next; if so, it is skipped.
   bool accept(char mark) {
     skip_ignored();
     if (at_ >= text_.size() || text_[at_] != mark) return false;
@@ -129,7 +129,7 @@ class ModelText {
     return values;
   }
 
-  // A value of any kind; false when it does not end.
+  // Skips a value of any kind; false when it has no end.
   bool skip_value() {
     if (quoted()) return true;
     int depth = 0;
@@ -168,7 +168,7 @@ struct ModelFields {
   std::vector<double> intrinsics, extrinsics, imagersize;
 };
 
-// nullopt where the text is no dictionary; `text` then stands at the place.
+// Nullopt when the text is not a dictionary; `text` then stands where reading failed.
 std::optional<ModelFields> fields_of(ModelText& text) {
   ModelFields fields;
   if (!text.accept('{')) return std::nullopt;
@@ -201,7 +201,7 @@ Result<Imager> imager_of(const ModelFields& fields, const fs::path& path) {
   if (rt.size() != 6 || !is_finite) return error("{}: extrinsics: expected 6 finite numbers.", path.string());
   const Pose imager_from_world(exp_rotation({rt[0], rt[1], rt[2]}), Eigen::Vector3d(rt[3], rt[4], rt[5]));
   if (!imager_from_world.is_finite())
-    return error("{}: extrinsics: expected numbers of a place within reach.", path.string());
+    return error("{}: extrinsics: expected a finite pose, found numbers too large.", path.string());
   const std::vector<double>& size = fields.imagersize;
   if (size.size() != 2) return error("{}: imagersize: expected [width, height].", path.string());
   for (const double side : size)
@@ -228,7 +228,7 @@ Result<Imager> load_cameramodel(const fs::path& path) {
 }
 
 Status save_cameramodel(const Imager& imager, const fs::path& path) {
-  // mrcal writes to a file by name and does not report a full disk: let it write to memory, then write that.
+  // mrcal does not report a full disk. So it writes to a file in memory, whose content is then written here.
   const int memory = ::memfd_create("limn-cameramodel", MFD_CLOEXEC);
   const fs::path aside = fmt::format("/proc/self/fd/{}", memory);
   StderrCapture complaint;

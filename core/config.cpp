@@ -20,9 +20,9 @@ struct ConfigNode::File {
 namespace {
 
 constexpr double k_quaternion_tolerance = 1e-3;
-constexpr int k_max_depth = 100;  // our files need 8; printing and freeing deeper ones would eat the stack
+constexpr int k_max_depth = 100;  // Limn's files need 8; printing or freeing a deeper one overflows the stack
 
-// What stands there, short enough for a message.
+// The value as text, short enough for a message.
 std::string found(const Json& json) {
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   if (text.size() > 60) text = text.substr(0, 57) + "...";
@@ -42,10 +42,9 @@ int edit_distance(const std::string& a, const std::string& b) {
   return row[b.size()];
 }
 
-// Reads JSON; `problem` gets the first key that stands twice in one object, or a nesting too deep to be
-// meant.
+// Reads JSON. `problem` reports the first key that is twice in one object, or nesting that is too deep.
 Json parse(const std::string& text, std::optional<std::string>* problem) {
-  std::vector<std::set<std::string>> keys;  // of the objects around the place being read
+  std::vector<std::set<std::string>> keys;  // keys so far of each object that is open
   const auto look = [&](int depth, Json::parse_event_t event, Json& value) {
     if (depth > k_max_depth) {
       if (!*problem)
@@ -146,7 +145,7 @@ bool ConfigNode::boolean() const {
 std::string ConfigNode::text() const {
   if (!json_) return "";
   if (json_->is_string()) return json_->get<std::string>();
-  problem(fmt::format("expected a text in quotes, found {}.", found(*json_)));
+  problem(fmt::format("expected text in quotes, found {}.", found(*json_)));
   return "";
 }
 

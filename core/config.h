@@ -13,14 +13,15 @@
 
 namespace limn {
 
-/// A place in a JSON file that people edit; it knows its path. The getters return the value, or note the
-/// first problem of the file ("FILE: projectors[0].lens.fx: expected …, found ….") and return a default, so
-/// that a reader reads straight through and asks Config::status() once at the end.
+/// A value in a JSON file that people edit; it knows its path. A getter returns the value. If that is not
+/// possible, it records the problem, unless the file already has one ("FILE: projectors[0].lens.fx: expected
+/// …, found …."), and returns a default. So callers read everything and check Config::status() once at the
+/// end.
 class ConfigNode {
  public:
-  ConfigNode() = default;  ///< an absent node: every getter returns its default and notes nothing
+  ConfigNode() = default;  ///< an absent node: every getter returns its default and records no problem
 
-  /// A required member; its absence is a problem.
+  /// A required member. If it is absent, a problem is recorded.
   ConfigNode at(const std::string& key) const;
   /// An optional member.
   std::optional<ConfigNode> find(const std::string& key) const;
@@ -50,9 +51,9 @@ class ConfigNode {
   bool is_number() const;
   const nlohmann::json& json() const;
 
-  /// Notes a problem here: "expected X, found Y." is the caller's sentence.
+  /// Records a problem of this value. The caller gives the sentence, such as "expected X, found Y."
   void problem(const std::string& sentence) const;
-  /// Problem when the object has a key outside `known`, with the nearest known key as advice.
+  /// Records a problem if the object has a key outside `known`; the message suggests the nearest known key.
   void only(const std::set<std::string>& known) const;
   const std::string& where() const { return where_; }
 
@@ -72,7 +73,7 @@ class Config {
   /// `schema` such as "limn.scene/1"; empty accepts files without one (POSES.json, VIEWER.json).
   static Result<Config> load(const std::filesystem::path& path, const std::string& schema);
   ConfigNode root() const;
-  /// The first problem noted, if any.
+  /// The first recorded problem, if any.
   Status status() const;
   std::filesystem::path folder() const;
 

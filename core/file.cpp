@@ -22,7 +22,7 @@ Error write_error(const fs::path& path, int code) {
   return error("{}: expected to write here, found: {}. {}", path.string(), std::strerror(code), advice);
 }
 
-// Writes all of content to an open file; 0 or errno.
+// Writes all of `content` to an open file; returns 0 or errno.
 int write_all(int fd, std::string_view content) {
   while (!content.empty()) {
     const ssize_t written = ::write(fd, content.data(), content.size());

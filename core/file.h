@@ -11,14 +11,14 @@ namespace limn {
 /// Whole content of a file.
 Result<std::string> read_file(const std::filesystem::path& path);
 
-/// Writes through a temporary file in the same folder, then renamed: `path` is either old or complete.
-/// A read-only folder or a full disk is an error that names it.
+/// Writes a temporary file in the same folder and renames it, so that `path` has either its old content or
+/// all of the new one. A read-only folder or a full disk is an error that names the file.
 Status write_file(const std::filesystem::path& path, std::string_view content);
 
-/// Writes at the file's end, all of it or nothing: what was there stays.
+/// Appends all of `content` or nothing; the old content stays.
 Status append_file(const std::filesystem::path& path, std::string_view content);
 
-/// Makes the folder and its parents where absent and checks that it can be written.
+/// Makes the folder and its parents if they are absent, and checks that the folder is writable.
 Status make_folder(const std::filesystem::path& path);
 
 }  // namespace limn

@@ -7,10 +7,10 @@
 
 namespace limn {
 
-/// A moment on the session's monotonic clock; which moment, the variable's name says (`captured_at`).
+/// A moment on the session's monotonic clock. The variable's name says which moment (`captured_at`).
 using Stamp = std::chrono::time_point<std::chrono::steady_clock, std::chrono::nanoseconds>;
 
-/// This moment.
+/// The current moment.
 inline Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Stamp::clock::now()); }
 /// Seconds from `from` to `to`.
 inline double seconds_between(Stamp from, Stamp to) {
@@ -26,9 +26,9 @@ struct Frame {
   std::string camera;
   cv::Mat image;
   Stamp captured_at;
-  /// Its brightness alone, where a camera's bytes hold that by themselves (JPEG); else empty.
+  /// The image's luma channel, if the camera's data contain it separately (JPEG); else empty.
   cv::Mat grey = {};
-  /// The JPEG that image and brightness were decoded from, if they were; else null.
+  /// The JPEG that `image` and `grey` were decoded from; null if the camera sent no JPEG.
   std::shared_ptr<const std::string> jpeg = {};
 };
 

@@ -23,8 +23,8 @@ Kind kind_of(std::string_view bytes) {
   return Kind::other;
 }
 
-// Offset behind a JPEG's header segments, where the scan starts: thumbnails in APP segments hold markers of
-// their own, so segments are skipped by their length.
+// Offset after a JPEG's header segments, where the scan starts. Segments are skipped by their length, because
+// thumbnails in APP segments contain markers, too.
 std::size_t jpeg_scan_start(std::string_view bytes) {
   std::size_t at = 2;
   while (at + 4 <= bytes.size() && bytes[at] == '\xff' && bytes[at + 1] != '\xda') {
@@ -33,8 +33,8 @@ std::size_t jpeg_scan_start(std::string_view bytes) {
   return at;
 }
 
-// A PNG ends in its IEND chunk and a JPEG's scan in an end-of-image marker; without them cv::imdecode would
-// return the rows it got and leave the rest grey or black.
+// A PNG ends in its IEND chunk and a JPEG's scan in an end-of-image marker. Without them cv::imdecode returns
+// the rows that it got and leaves the rest grey or black.
 bool is_complete(std::string_view bytes, Kind kind) {
   if (kind == Kind::png) return bytes.rfind("IEND") != std::string_view::npos;
   if (kind == Kind::jpeg) return bytes.find("\xff\xd9", jpeg_scan_start(bytes)) != std::string_view::npos;
@@ -47,11 +47,11 @@ Result<cv::Mat> read(const fs::path& path, int flags) {
   const std::string& bytes = *content;
   const Kind kind = kind_of(bytes);
   if (kind == Kind::other) {
-    return error("{}: expected a PNG or JPEG picture, found {}.", path.string(),
+    return error("{}: expected a PNG or JPEG image, found {}.", path.string(),
                  bytes.empty() ? std::string("an empty file") : fmt::format("{} other bytes", bytes.size()));
   }
   const Error truncated = error(
-      "{}: expected a whole {} picture, found a truncated or damaged one ({} bytes). "
+      "{}: expected a complete {} image, found a truncated or damaged one ({} bytes). "
       "Copy or capture it again.",
       path.string(), kind == Kind::png ? "PNG" : "JPEG", bytes.size());
   if (!is_complete(bytes, kind)) return truncated;
@@ -83,7 +83,7 @@ std::string big_endian(std::uint32_t value) {
   return bytes;
 }
 
-// The pHYs chunk (pixels per metre on both axes), to stand directly behind IHDR.
+// The pHYs chunk (pixels per metre on both axes), which goes directly after IHDR.
 std::string physical_size_chunk(double pixels_per_metre) {
   const std::string density = big_endian(static_cast<std::uint32_t>(std::lround(pixels_per_metre)));
   const std::string body = "pHYs" + density + density + std::string(1, '\1');
@@ -127,8 +127,8 @@ cv::Mat to_grey(const cv::Mat& image) {
 Status write_png(const fs::path& path, const cv::Mat& image, const PngOptions& options) {
   LIMN_CHECK(!image.empty());
   std::vector<uchar> encoded;
-  // OpenCV's own fast setting is without a level, which would have libpng try all filters instead of one:
-  // half the time, a file up to a third larger.
+  // OpenCV's fast setting is the one without a level: with a level, libpng tries all filters instead of one.
+  // The fast setting takes half the time; the file is up to a third larger.
   std::vector<int> flags;
   if (options.compression != 1) flags = {cv::IMWRITE_PNG_COMPRESSION, options.compression};
   cv::imencode(".png", image, encoded, flags);

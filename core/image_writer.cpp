@@ -10,7 +10,7 @@ Status ImageWriter::stored(const Job& job) {
   try {
     return job.bytes ? write_file(job.path, *job.bytes) : write_png(job.path, job.image, {.compression = 1});
   } catch (const std::exception& problem) {
-    return error("{}: cannot encode this picture: {}.", job.path.string(), problem.what());
+    return error("{}: cannot encode this image: {}.", job.path.string(), problem.what());
   }
 }
 

@@ -15,42 +15,42 @@
 
 namespace limn {
 
-/// Writes captured images as lightly compressed PNG on a thread of its own, so that the next image is
-/// taken meanwhile. The queue is short: store() waits when the disk is slower than the camera.
+/// Writes captured images as lightly compressed PNG on its own thread, so that the next image can be captured
+/// at the same time. The queue is short: store() waits when the disk is slower than the camera.
 class ImageWriter {
  public:
-  /// `most_queued` images wait at most (8: 16 MB of grey 1920x1080).
+  /// At most `most_queued` images wait in the queue (8 grey images of 1920x1080 are 16 MB).
   explicit ImageWriter(std::size_t most_queued = 8);
-  ~ImageWriter();  ///< writes what is queued
+  ~ImageWriter();  ///< Writes all queued images first.
   ImageWriter(const ImageWriter&) = delete;
   ImageWriter& operator=(const ImageWriter&) = delete;
 
-  /// Queues an image; the error is the first one of an earlier image.
+  /// Queues an image; waits while the queue is full. Returns the first error of an earlier image, if any.
   Status store(const std::filesystem::path& path, const cv::Mat& image);
-  /// The same without waiting: false when the queue is full (the disk is too slow) or an earlier image
-  /// could not be written, and the image is dropped.
+  /// Queues an image without waiting. If the queue is full (the disk is too slow) or an earlier image could
+  /// not be written, the image is dropped and false is returned.
   bool offer(const std::filesystem::path& path, const cv::Mat& image);
-  /// Likewise a file's bytes as they are.
+  /// Queues bytes that are written to a file unchanged; otherwise as offer(path, image).
   bool offer(const std::filesystem::path& path, std::shared_ptr<const std::string> bytes);
-  /// Waits until all is written; the first error, if any.
+  /// Waits until everything is written. Returns the first error, if any.
   Status finish();
 
  private:
   struct Job {
     std::filesystem::path path;
     cv::Mat image;
-    std::shared_ptr<const std::string> bytes = {};  // instead
+    std::shared_ptr<const std::string> bytes = {};  // if not null, written instead of `image`
   };
   static Status stored(const Job& job);
   bool offer(Job job);
   void run();
-  Status failure() const;  // call with mutex_ held
+  Status failure() const;  // the caller must hold mutex_
 
   std::size_t most_queued_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> jobs_;
-  std::size_t unwritten_ = 0;  // queued or being written
+  std::size_t unwritten_ = 0;  // jobs that are queued or being written
   std::optional<Error> failure_;
   bool closing_ = false;
   std::thread thread_;

@@ -28,7 +28,7 @@ std::optional<Imager> resized(const Imager& imager, int width, int height) {
   Imager changed = imager;
   changed.width = width;
   changed.height = height;
-  auto& values = changed.lens.values;  // fx, fy, cx, cy first; pixel centres lie at integers
+  auto& values = changed.lens.values;  // the first are fx, fy, cx, cy; pixel centres are at integers
   values[0] *= scale_x;
   values[1] *= scale_y;
   values[2] = (values[2] + 0.5) * scale_x - 0.5;

@@ -9,7 +9,7 @@
 
 namespace limn {
 
-/// Pixels: no image's side is longer; the largest that GL 4.5 must hold.
+/// Largest width and height of an imager, in pixels; GL 4.5 guarantees textures of this size.
 inline constexpr int k_max_side = 16384;
 
 /// A half-line: origin (m) and unit direction.
@@ -18,8 +18,8 @@ struct Ray {
   Eigen::Vector3d d = Eigen::Vector3d::UnitZ();
 };
 
-/// A camera or a projector: the geometry is one type, the light only runs the other way.
-/// Frame: x right, y down, z forward; pixel (0,0) is the centre of the top-left pixel.
+/// A camera or a projector: both have the same geometry.
+/// Axes: x right, y down, z forward; pixel (0,0) is the centre of the top-left pixel.
 struct Imager {
   std::string name;
   int width = 0;
@@ -27,20 +27,21 @@ struct Imager {
   Lens lens;
   Pose imager_from_world;
 
-  /// Pixel of a world point, also when outside the image; nullopt when it has none (behind).
+  /// Pixel of a world point, which may lie outside the image; nullopt when the point has no pixel (behind the
+  /// imager).
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p_world) const;
-  /// Ray of a pixel in the world.
+  /// Ray of a pixel in the world; nullopt when the pixel has no direction.
   std::optional<Ray> ray(const Eigen::Vector2d& px) const;
-  /// Whether px lies on the image, its outer pixels' areas included.
+  /// Whether px lies in the image, including the whole area of the outermost pixels.
   bool contains(const Eigen::Vector2d& px) const;
 };
 
-/// The same imager read out at another resolution of the same aspect ratio (within 1 %), as ARToolKit's
-/// camera files are meant; nullopt for another aspect ratio or a size of 0.
+/// The same imager at another resolution of the same aspect ratio (within 1 %); ARToolKit uses its camera
+/// files this way. Nullopt for another aspect ratio or a size of 0.
 std::optional<Imager> resized(const Imager& imager, int width, int height);
 
-/// An imager without distortion, horizontal field of view `fov_deg`, principal point at ((w-1)/2, (h-1)/2):
-/// the Viewer of docs/formats.md.
+/// An imager without distortion, with the horizontal field of view `fov_deg` and the principal point at
+/// ((w-1)/2, (h-1)/2): the Viewer of docs/formats.md.
 Imager viewer_imager(const Pose& world_from_viewer, int width, int height, double fov_deg);
 
 }  // namespace limn

@@ -26,7 +26,7 @@ const OpencvFile::Value* first_of(const OpencvFile& file, Names names) {
   return nullptr;
 }
 
-// Of a matrix; none where the file has none.
+// Elements of the matrix with one of these names; none if the file has no such matrix.
 Result<std::vector<double>> numbers_of(const OpencvFile& file, Names names, const fs::path& path) {
   const OpencvFile::Value* value = first_of(file, names);
   if (!value) return std::vector<double>();
@@ -56,7 +56,7 @@ Result<std::string> model_of_distortion(std::vector<double>* distortion, const f
   }
 }
 
-// Width or height in pixels; 0 where the file has none.
+// Width or height in pixels; 0 if the file has none.
 Result<int> side_of(const OpencvFile& file, Names names, const fs::path& path) {
   for (const char* name : names) {
     if (!file.find(name)) continue;
@@ -92,7 +92,8 @@ Result<Imager> load_opencv(const fs::path& path, const std::string& text) {
 
 // ---- ARToolKit ----
 
-// Parameters of camera_para.dat: an ideal pixel by the 3x4 matrix, then a distortion in the image's plane.
+// Parameters of camera_para.dat: the 3x4 matrix gives an ideal pixel, which is then distorted in the image
+// plane.
 struct ArtoolkitCamera {
   int version = 0;
   int width = 0;
@@ -101,7 +102,7 @@ struct ArtoolkitCamera {
   std::vector<double> factors;  // meaning depends on the version
 };
 
-// Observed pixel of an ideal one (ARToolKit's arParamIdeal2Observ, versions 1 to 4).
+// The observed pixel of an ideal one (ARToolKit's arParamIdeal2Observ, versions 1 to 4).
 Eigen::Vector2d observed_pixel(const ArtoolkitCamera& camera, const Eigen::Vector2d& ideal) {
   const auto& d = camera.factors;
   if (camera.version == 4) {
@@ -113,7 +114,8 @@ Eigen::Vector2d observed_pixel(const ArtoolkitCamera& camera, const Eigen::Vecto
     return bent.cwiseProduct(f) + centre;
   }
   const Eigen::Vector2d centre(d[0], d[1]);
-  const double scale = camera.version == 1 ? d[3] : d[2];  // version 1 stores radial factor and scale swapped
+  const double scale =
+      camera.version == 1 ? d[3] : d[2];  // in version 1 the scale comes after the radial factor
   const double aspect = camera.version == 3 ? d[3] : 1;
   const double k1 = camera.version == 1 ? d[2] : camera.version == 2 ? d[3] : d[4];
   const double k2 = camera.version == 1 ? 0 : camera.version == 2 ? d[4] : d[5];
@@ -128,9 +130,9 @@ struct LensSample {
   Eigen::Vector2d px;
 };
 
-constexpr int k_value_count = 12;  // of LENSMODEL_OPENCV8
+constexpr int k_value_count = 12;  // number of values of LENSMODEL_OPENCV8
 
-// Lens of `model`, LENSMODEL_OPENCV8, that fits the samples best in pixels: Gauss-Newton from a pinhole.
+// Values of the LENSMODEL_OPENCV8 lens that fits the samples best in pixels, by Gauss-Newton from a pinhole.
 std::vector<double> fitted_lens_values(const LensModel& model,
                                        std::vector<double> values,
                                        const std::vector<LensSample>& samples) {
@@ -151,7 +153,8 @@ std::vector<double> fitted_lens_values(const LensModel& model,
     Eigen::Matrix<double, k_value_count, k_value_count> hessian = jacobian.transpose() * jacobian;
     Eigen::Vector<double, k_value_count> gradient = jacobian.transpose() * residuals;
     hessian.diagonal().array() += 1e-9;
-    // Numerator and denominator of OPENCV8 cancel: without a weight the fit puts poles into the image.
+    // The numerator and denominator of OPENCV8 can cancel. Without this prior the fit puts poles into the
+    // image.
     constexpr double k_distortion_weight = 1e-2;  // (0.1 px / 1)^2
     for (int i = 4; i < k_value_count; ++i) {
       hessian(i, i) += k_distortion_weight;
@@ -159,14 +162,15 @@ std::vector<double> fitted_lens_values(const LensModel& model,
     }
     const Eigen::Vector<double, k_value_count> step = hessian.ldlt().solve(gradient);
     for (int i = 0; i < k_value_count; ++i) values[static_cast<std::size_t>(i)] += step[i];
-    constexpr double k_settled_px = 1e-3;  // what the next step moves is far less
+    constexpr double k_settled_px = 1e-3;  // the next step would move pixels by far less
     const double moved_px = std::sqrt(step.dot(hessian * step) / static_cast<double>(samples.size()));
     if (!(moved_px > k_settled_px)) break;
   }
   return values;
 }
 
-// Whether the ideal pixel is a pinhole's, and no corner of the image is bent beyond its neighbourhood.
+// Whether the matrix is that of a pinhole and the distortion moves no corner by more than the image's
+// diagonal.
 bool is_camera(const ArtoolkitCamera& camera) {
   const auto& m = camera.matrix;
   const bool is_pinhole = m[0] > 0 && m[5] > 0 && m[8] == 0 && m[9] == 0 && m[10] == 1;
@@ -179,7 +183,7 @@ bool is_camera(const ArtoolkitCamera& camera) {
   return is_pinhole;
 }
 
-// Grid of directions over the image with the pixels where ARToolKit's model puts them.
+// A grid of directions over the image, with their pixels by ARToolKit's model.
 std::vector<LensSample> samples_of(const ArtoolkitCamera& camera, int grid) {
   Eigen::Matrix3d pinhole;
   for (int row = 0; row < 3; ++row) {
@@ -200,7 +204,7 @@ std::vector<LensSample> samples_of(const ArtoolkitCamera& camera, int grid) {
 }
 
 Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path& path) {
-  constexpr std::size_t k_factor_counts[] = {4, 5, 6, 9};  // versions 1 to 4, told apart by the file's size
+  constexpr std::size_t k_factor_counts[] = {4, 5, 6, 9};  // versions 1 to 4, recognised by the file's size
   ArtoolkitCamera camera;
   std::size_t at = 0;
   const auto read_bytes = [&](std::size_t size) {
@@ -225,7 +229,7 @@ Result<ArtoolkitCamera> parse_artoolkit(const std::string& bytes, const fs::path
   if (!sane) {
     return error(
         "{}: expected an ARToolKit camera_para.dat of 136, 144, 152 or 176 bytes (versions 1 to 4), found "
-        "{} bytes that are not one.",
+        "{} bytes of something else.",
         path.string(), bytes.size());
   }
   return camera;
@@ -235,9 +239,9 @@ Result<Imager> load_artoolkit(const fs::path& path, const std::string& bytes) {
   LIMN_TRY(const ArtoolkitCamera camera, parse_artoolkit(bytes, path));
   if (!is_camera(camera))
     return error(
-        "{}: expected the matrix of a pinhole (positive focal lengths, last row 0 0 1) and a distortion "
-        "within "
-        "a picture's size, found something else. Is it an ARToolKit camera_para.dat?",
+        "{}: expected a pinhole matrix (positive focal lengths, last row 0 0 1) and a distortion that moves "
+        "the corners by less than the image's size, found something else. Is it an ARToolKit "
+        "camera_para.dat?",
         path.string());
   const LensModel model = LensModel::parse("LENSMODEL_OPENCV8").value();
   constexpr int k_fit_grid = 12;  // 338 numbers for 12 values
@@ -246,7 +250,8 @@ Result<Imager> load_artoolkit(const fs::path& path, const std::string& bytes) {
       Lens::create(model.name(), fitted_lens_values(model, {m[0], m[5], m[2], m[6], 0, 0, 0, 0, 0, 0, 0, 0},
                                                     samples_of(camera, k_fit_grid)));
   if (!lens) return error("{}: {}", path.string(), lens.message());
-  // Version 1 is round in pixels, mrcal's models in tangents: 0.18 px for fy/fx = 1.036.
+  // The distortion of version 1 is circular in pixels, mrcal's in tangents; they differ by 0.18 px when
+  // fy/fx = 1.036.
   constexpr double k_max_refit_px = 0.5;
   for (const LensSample& sample : samples_of(camera, 2 * k_fit_grid)) {
     const auto px = lens->project(sample.p);

@@ -8,22 +8,23 @@
 
 namespace limn {
 
-/// How far a search goes and how its steps are damped. The defaults suit a start that lies near its minimum.
+/// When a search ends and how its steps are damped. The defaults suit a start near the minimum.
 struct LeastSquaresOptions {
-  int max_steps = 50;           ///< steps tried, accepted or not
-  double first_damping = 1e-4;  ///< of the first step; less saves steps near a minimum, more costs some
+  int max_steps = 50;           ///< Steps tried, accepted or not.
+  double first_damping = 1e-4;  ///< Damping of the first step; a low value saves steps near a minimum.
   double least_damping = 1e-12;
-  double most_damping = 1e8;  ///< the search ends where it would be reached: no shorter step lowers the cost
-  /// A vain step raises the damping tenfold from at least this. More than 0 saves steps where the damping has
-  /// fallen so far that it does not change a step.
+  double most_damping = 1e8;  ///< The search ends at this damping: no shorter step lowers the cost.
+  /// A rejected step sets the damping to ten times its value, or ten times this if the damping is lower. A
+  /// value above 0 saves steps where the damping has become too small to change a step.
   double raised_from = 0;
-  bool accepts_equal_cost = true;        ///< whether a step that leaves the cost as it is counts as one down
-  bool damps_more_without_step = false;  ///< instead of ending where the damped equations have no solution
+  bool accepts_equal_cost = true;  ///< Whether a step that does not change the cost is accepted.
+  /// If the damped equations have no solution: true raises the damping, false ends the search.
+  bool damps_more_without_step = false;
 };
 
 /// A step that was tried.
 struct LeastSquaresTrial {
-  int step = 0;  ///< its number, from 0
+  int step = 0;  ///< The step's number, from 0.
   double cost_before = 0, cost_after = 0;
   bool is_accepted = false;
 
@@ -31,34 +32,33 @@ struct LeastSquaresTrial {
 };
 
 enum class LeastSquaresEnd {
-  no_start,  ///< the cost of the start is not finite
-  settled,   ///< the problem's own rule
-  no_step,   ///< the (damped) equations have no solution
-  no_gain,   ///< however much steps are damped, none lowers the cost
+  no_start,  ///< The cost of the start is not finite.
+  settled,   ///< The problem's is_settled() returned true.
+  no_step,   ///< The (damped) equations have no solution.
+  no_gain,   ///< No step lowers the cost, even with the highest damping.
   too_many_steps
 };
 
 struct LeastSquaresSummary {
   LeastSquaresEnd end = LeastSquaresEnd::no_start;
-  int steps = 0;                                           ///< tried, accepted or not
-  double cost = std::numeric_limits<double>::quiet_NaN();  ///< at the problem's last state
+  int steps = 0;                                           ///< Steps tried, accepted or not.
+  double cost = std::numeric_limits<double>::quiet_NaN();  ///< Cost of the problem's final state.
 };
 
-/// What `minimise` works on: a sum of squares (or of robust losses of them) with a state, the normal
-/// equations at that state, and a trial state beside it. The problem keeps all of them, in what form it
-/// likes.
-///   double cost()              of the state; asked for once, at the start.
-///   bool linearise()           optional: makes the equations at the state, once for each state that a step
-///                              starts from. False ends the search (no_step). Problems whose trial makes the
-///                              equations with the cost do without.
-///   bool solve(damping)        finds the step, for the diagonal times (1 + damping); false when there is
-///   none.
-///                              Sparse problems eliminate what they like here.
-///   double evaluate_trial()    moves the trial there; its cost. Not finite: the state cannot be left that
-///   way. void accept_trial()        the trial is the state from now on. bool is_settled(trial)     after
-///   each trial, accepted or not: whether it was the last. Sound rules are that
-///                              the step promised next to nothing, or that it was accepted and gained next to
-///                              nothing (Madsen, Nielsen, Tingleff 2004, section 3.2).
+/// What `minimise` works on: a sum of squares (or of robust losses of squares). The problem stores a state,
+/// the normal equations at that state and a trial state, in any form. Its functions:
+/// - `double cost()`: Returns the cost of the state. It is called once, at the start.
+/// - `bool linearise()`: Optional. Makes the equations at the state, once for each state that a step starts
+///   from. False ends the search (no_step). A problem whose evaluate_trial() already makes the equations does
+///   not need it.
+/// - `bool solve(damping)`: Finds the step for the diagonal times (1 + damping); false when there is no
+///   solution. Sparse problems can eliminate unknowns here.
+/// - `double evaluate_trial()`: Makes the trial state by that step and returns its cost. A cost that is not
+///   finite means that the step is impossible.
+/// - `void accept_trial()`: Makes the trial state the state.
+/// - `bool is_settled(trial)`: Says after each trial, accepted or not, whether it was the last. Good rules:
+///   the step predicted almost no gain, or it was accepted and gained almost nothing (Madsen, Nielsen,
+///   Tingleff 2004, section 3.2).
 template <class Problem>
 concept LeastSquaresProblem = requires(Problem problem, double damping, const LeastSquaresTrial& trial) {
   { problem.cost() } -> std::convertible_to<double>;
@@ -68,16 +68,16 @@ concept LeastSquaresProblem = requires(Problem problem, double damping, const Le
   { problem.is_settled(trial) } -> std::convertible_to<bool>;
 };
 
-/// Takes the problem's state downhill to the minimum near it by Levenberg's and Marquardt's method (Levenberg
-/// 1944; Marquardt 1963, "An algorithm for least-squares estimation of nonlinear parameters"): an accepted
-/// step divides the damping by ten, a vain one multiplies it by ten. The cost never rises, and a trial whose
-/// cost is NaN or infinite is never accepted. Allocates nothing itself.
+/// Moves the problem's state to a local minimum by the Levenberg-Marquardt method (Levenberg 1944; Marquardt
+/// 1963, "An algorithm for least-squares estimation of nonlinear parameters"): an accepted step divides the
+/// damping by ten, a rejected one multiplies it by ten. The cost never rises, and a trial whose cost is NaN
+/// or infinite is never accepted. The function itself allocates no memory.
 template <LeastSquaresProblem Problem>
 LeastSquaresSummary minimise(Problem* problem, const LeastSquaresOptions& options) {
   LeastSquaresSummary summary{.cost = problem->cost()};
   if (!std::isfinite(summary.cost)) return summary;
   double damping = options.first_damping;
-  bool is_new = true;  // the state, to its equations
+  bool is_new = true;  // whether the state has no equations yet
   while (summary.steps < options.max_steps) {
     summary.end = LeastSquaresEnd::no_step;
     if constexpr (requires { problem->linearise(); }) {
@@ -92,7 +92,7 @@ LeastSquaresSummary minimise(Problem* problem, const LeastSquaresOptions& option
       continue;
     }
     trial.cost_after = problem->evaluate_trial();
-    // Written so that NaN is none.
+    // Written so that a cost of NaN is not accepted.
     trial.is_accepted = options.accepts_equal_cost ? trial.cost_after <= trial.cost_before
                                                    : trial.cost_after < trial.cost_before;
     if (trial.is_accepted) {
@@ -112,8 +112,8 @@ LeastSquaresSummary minimise(Problem* problem, const LeastSquaresOptions& option
   return summary;
 }
 
-/// The matrix of normal equations with its diagonal times 1 + damping: steps do not depend on the unknowns'
-/// units (Marquardt 1963).
+/// The matrix of normal equations with its diagonal times (1 + damping). This damping makes steps independent
+/// of the unknowns' units (Marquardt 1963).
 template <class Derived>
 typename Derived::PlainObject damped(const Eigen::MatrixBase<Derived>& matrix, double damping) {
   typename Derived::PlainObject out = matrix;
@@ -121,12 +121,12 @@ typename Derived::PlainObject damped(const Eigen::MatrixBase<Derived>& matrix, d
   return out;
 }
 
-// Robust losses: what a residual costs as a function of its square, in squared standard deviations, and the
-// weight that its square has in the normal equations, which is the loss's derivative (iteratively reweighted
-// least squares; Holland and Welsch 1977).
+// Robust losses. cost() is a residual's cost as a function of its square, in squared standard deviations.
+// weight() is the derivative of the cost: the weight of the square in the normal equations (iteratively
+// reweighted least squares; Holland and Welsch 1977).
 
-/// Huber's (1964): squares up to `limit` standard deviations, linear beyond. A limit of 0 stands for plain
-/// squares everywhere.
+/// Huber's loss (1964): quadratic up to `limit` standard deviations, linear beyond. A limit of 0 means
+/// quadratic everywhere.
 struct HuberLoss {
   double limit = 0;
 
@@ -137,8 +137,8 @@ struct HuberLoss {
   double weight(double square) const { return is_beyond(square) ? limit / std::sqrt(square) : 1; }
 };
 
-/// Cauchy's: grows with the logarithm, so that what is far off hardly counts. A residual of `limit` standard
-/// deviations has half its weight.
+/// Cauchy's loss: grows with the logarithm of the square, so that outliers hardly count. A residual of
+/// `limit` standard deviations has half of its weight.
 struct CauchyLoss {
   explicit CauchyLoss(double limit) : square_limit(limit * limit) {}
 

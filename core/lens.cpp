@@ -23,8 +23,8 @@ struct LensModel::Impl {
     return p.allFinite() && !p.isZero(0) && (projects_behind || p.z() > 0);
   }
 
-  // Derivatives by the values are those of a single point. mrcal 2.2 mixes up the derivatives of several
-  // points of one call, and their pixels in mrcal_project_pinhole.
+  // Derivatives by the values are possible for one point only: mrcal 2.2 confuses the derivatives of several
+  // points in one call, and in mrcal_project_pinhole also their pixels.
   bool project(std::span<const double> values,
                std::span<const Eigen::Vector3d> p,
                Eigen::Vector2d* px,
@@ -51,16 +51,16 @@ struct LensModel::Impl {
 
 namespace {
 
-// Beyond this tangent of the off-axis angle (35°) a polynomial lens may have folded back on itself; below it
-// none that a person would build does.
+// Beyond this tangent of the off-axis angle (35°) a polynomial distortion can fold back on itself. Below it
+// the distortion of no real lens does.
 constexpr double k_surely_unfolded_tangent = 0.7;
-constexpr double k_fold_step = 1.15;  // ratio of the tangents that are checked on the way out
+constexpr double k_fold_step = 1.15;  // ratio of successive tangents that are checked from there outwards
 constexpr int k_max_newton_steps = 30;
 constexpr double k_unproject_tolerance_px = 1e-9;
 constexpr double k_accepted_residual_px = 1e-6;
 
-// mrcal takes any grid of a splined lens: its number of values may overflow, and it reads beside one with
-// fewer columns or rows than a spline needs.
+// Whether mrcal can use a splined lens's grid safely. mrcal accepts any grid: the number of values can
+// overflow, and with fewer columns or rows than a spline needs it reads out of bounds.
 bool has_sound_grid(const mrcal_lensmodel_t& model) {
   if (model.type != MRCAL_LENSMODEL_SPLINED_STEREOGRAPHIC) return true;
   constexpr int k_most = 1000;
@@ -88,7 +88,7 @@ bool is_unfolded(const LensModel& model, std::span<const double> values, const E
   return keeps_orientation(model, values, xy);
 }
 
-// Newton on the normalised coordinates, steps halved while the residual grows.
+// Newton's method on the normalised coordinates; steps are halved while the residual grows.
 bool newton_unproject(const LensModel& model,
                       std::span<const double> values,
                       const Eigen::Vector2d& px,
@@ -109,7 +109,7 @@ bool newton_unproject(const LensModel& model,
           (found - px).norm() < residual) {
         break;
       }
-      if (residual < k_accepted_residual_px) {  // rounding: no step improves it further
+      if (residual < k_accepted_residual_px) {  // limit of rounding: no step improves it further
         *d_imager = xy.homogeneous().normalized();
         return true;
       }
@@ -130,7 +130,7 @@ Result<LensModel> LensModel::parse(const std::string& name) {
   auto impl = std::make_shared<Impl>();
   impl->name = name;
   const Error unknown = error(
-      "lens model '{}': expected one of mrcal's, such as LENSMODEL_PINHOLE, LENSMODEL_OPENCV4, "
+      "lens model '{}': expected one of mrcal's models, such as LENSMODEL_PINHOLE, LENSMODEL_OPENCV4, "
       "LENSMODEL_OPENCV5, LENSMODEL_OPENCV8, LENSMODEL_OPENCV12 or "
       "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=18_fov_x_deg=100.",
       name);

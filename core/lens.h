@@ -11,12 +11,12 @@
 
 namespace limn {
 
-/// Derivative of a pixel by the point that it shows.
+/// Derivative of a pixel with respect to the point that it shows.
 using PixelByPoint = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 
 /// One of mrcal's lens models, without its values: `LENSMODEL_PINHOLE`, `LENSMODEL_OPENCV4/5/8/12`,
-/// `LENSMODEL_SPLINED_STEREOGRAPHIC_order=…`, and so on. The formulas are mrcal's alone (mrcal.h).
-/// Cheap to copy; safe to use from several threads.
+/// `LENSMODEL_SPLINED_STEREOGRAPHIC_order=…`, and so on. All formulas come from mrcal (mrcal.h).
+/// An object is cheap to copy and can be used by several threads at once.
 class LensModel {
  public:
   /// `LENSMODEL_PINHOLE`.
@@ -24,28 +24,29 @@ class LensModel {
   static Result<LensModel> parse(const std::string& name);
 
   const std::string& name() const;
-  /// Values a lens of this model has; the first four are fx, fy, cx, cy (pixels).
+  /// Number of values of a lens of this model; the first four are fx, fy, cx, cy (pixels).
   int value_count() const;
   /// Whether points behind the imager can have a pixel (splined and fisheye models).
   bool projects_behind() const;
 
-  /// Pixel of p (imager frame, any unit, |p| > 0), for solvers that hold the values elsewhere. `d_px_d_p`
+  /// Pixel of p (imager frame, any unit, |p| > 0), for solvers that store the values themselves. `d_px_d_p`
   /// (2x3) and `d_px_d_values` (2 x value_count), both row-major, are filled when not null. False when p has
-  /// no finite pixel (behind the imager for models with a projection plane, or not finite).
+  /// no finite pixel: p is not finite, or it lies behind an imager whose model has a projection plane.
   bool project(std::span<const double> values,
                const Eigen::Vector3d& p,
                Eigen::Vector2d* px,
                double* d_px_d_p = nullptr,
                double* d_px_d_values = nullptr) const;
 
-  /// The same of many points at once, which costs less. `px` has one for each; `d_px_d_p`, too, unless it is
-  /// empty. False when one of them has no finite pixel: then neither is of use.
+  /// As project(), for many points in one call, which is faster. `px` has one element for each point;
+  /// `d_px_d_p` has, too, unless it is empty. False when any point has no finite pixel: then the contents of
+  /// both are not meaningful.
   bool project_all(std::span<const double> values,
                    std::span<const Eigen::Vector3d> p,
                    std::span<Eigen::Vector2d> px,
                    std::span<PixelByPoint> d_px_d_p = {}) const;
 
-  /// Unit direction that project() takes to px. False when there is none (outside the model's domain).
+  /// Unit direction that project() maps to px. False when there is none (px outside the model's domain).
   bool unproject(std::span<const double> values, const Eigen::Vector2d& px, Eigen::Vector3d* d_imager) const;
 
   bool operator==(const LensModel& other) const { return name() == other.name(); }
@@ -70,16 +71,17 @@ struct Lens {
   double cx() const { return values[2]; }
   double cy() const { return values[3]; }
 
-  /// Pixel of p (imager frame); nullopt when it has none, also where a polynomial distortion has folded back
-  /// on itself so far off the axis that LensModel::project would answer with a pixel of another direction.
+  /// Pixel of p (imager frame); nullopt when p has none. A polynomial distortion can fold back on itself far
+  /// off the axis, where LensModel::project returns the pixel of another direction; here the result is
+  /// nullopt.
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p) const;
   /// Unit direction of a pixel; nullopt when it has none.
   std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& px) const;
 };
 
 /// Unit directions of every `step`-th pixel of a width x height image, row by row, for baked maps and ray
-/// tracing: (ceil(height / step) * ceil(width / step)) entries, entry (row, col) is pixel (col, row) * step.
-/// Uses all cores. Pixels without a direction are NaN.
+/// tracing. There are ceil(height / step) * ceil(width / step) entries; entry (row, col) belongs to pixel
+/// (col, row) * step. Pixels without a direction are NaN. The computation uses all cores.
 std::vector<Eigen::Vector3f> direction_map(const Lens& lens, int width, int height, int step = 1);
 
 }  // namespace limn

@@ -11,9 +11,9 @@ EigenPairs6 eigen_pairs(const Matrix6d& symmetric) {
 
 namespace {
 
-// By L D L^T without pivots; false when the matrix is not surely positive definite.
+// Solves m x = b by L D L^T without pivoting; false when the matrix may not be positive definite.
 bool solve_definite(const Matrix6d& m, const Vector6d& b, Vector6d* x) {
-  constexpr double k_least_pivot = 1e-12;  // of its diagonal
+  constexpr double k_least_pivot = 1e-12;  // as a share of the diagonal element
   Matrix6d l, ld;
   for (int j = 0; j < 6; ++j) {
     for (int i = j; i < 6; ++i) {

@@ -21,7 +21,7 @@ constexpr double k_silent_s = 1;  // shorter work shows no progress (docs/format
 constexpr double k_terminal_every_s = 0.1;
 constexpr double k_file_every_s = 5;
 
-// A line that cannot be written, on a full disk or into a closed pipe, is lost: nobody can be told.
+// A line that cannot be written (full disk, closed pipe) is lost, because there is no other way to report it.
 void write_line(const std::string& text) {
   const std::lock_guard lock(g_stderr);
   std::fwrite(text.data(), 1, text.size(), stderr);

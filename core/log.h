@@ -8,9 +8,9 @@ namespace limn {
 
 enum class LogLevel { quiet, warning, info };
 
-/// What reaches stderr; info unless set.
+/// Sets which messages are printed to stderr; the default is info.
 void set_log_level(LogLevel level);
-/// One line on stderr, safe from several threads. stdout is for results alone.
+/// Prints one line to stderr; several threads may call it. stdout is only for results.
 void log_line(LogLevel level, const std::string& line);
 
 template <class... Args>
@@ -22,8 +22,8 @@ void log_warning(fmt::format_string<Args...> format, Args&&... args) {
   log_line(LogLevel::warning, fmt::format(format, std::forward<Args>(args)...));
 }
 
-/// Progress of long work on stderr: "capture 37/704 (12 s)". Redraws one line on a terminal, prints a line
-/// every few seconds elsewhere; silent for work under a second.
+/// Shows the progress of long work on stderr: "capture 37/704 (12 s)". On a terminal one line is redrawn;
+/// otherwise a line is printed every few seconds. Work of less than a second shows nothing.
 class Progress {
  public:
   Progress(std::string what, int total);

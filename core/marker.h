@@ -8,8 +8,8 @@
 
 namespace limn {
 
-/// `family:id`, such as `apriltag_36h11:0`, `aruco_4x4_50:3`, `artoolkit:hiro.patt`. Everything after the
-/// last colon is the id, so that `aruco:FILE.yml:7` has the family `aruco:FILE.yml`.
+/// A marker's name `family:id`, such as `apriltag_36h11:0`, `aruco_4x4_50:3`, `artoolkit:hiro.patt`. The id
+/// is everything after the last colon, so that `aruco:FILE.yml:7` has the family `aruco:FILE.yml`.
 struct MarkerName {
   std::string family;
   std::string id;
@@ -20,14 +20,14 @@ struct MarkerName {
 };
 
 /// A square marker on a body. Marker frame: origin at the centre, x right, y down, z into the paper.
-/// size_m is the side of the black square's outer edge.
+/// size_m is the side length of the black square, measured at its outer edge.
 struct BodyMarker {
   MarkerName marker;
   double size_m = 0;
   Pose body_from_marker;
 };
 
-/// A rigid thing that markers stand on: the prototype, or a slot's single marker.
+/// A rigid thing with markers on it: the prototype, or a slot's single marker.
 struct Body {
   std::string name;
   std::vector<BodyMarker> markers;

@@ -6,10 +6,11 @@
 
 namespace limn {
 
-// Order statistics. Those that take a pointer change the order of the values and copy nothing; a value is
-// always one of the given, but for `mean_median`.
+// Order statistics. Functions that take a pointer reorder the values in place and copy nothing. The result is
+// always one of the given values, except for `mean_median`.
 
-/// The value that `rank` others come before (0: the least). `values` has begin() and end(); rank < its size.
+/// The value with `rank` others before it in sorted order (rank 0 is the smallest). `values` has begin() and
+/// end(); rank must be less than its size.
 template <class Values>
 auto value_of_rank(Values* values, std::size_t rank) {
   const auto at = values->begin() + static_cast<std::ptrdiff_t>(rank);
@@ -17,14 +18,15 @@ auto value_of_rank(Values* values, std::size_t rank) {
   return *at;
 }
 
-/// The middle of the values (the upper one of an even number), in their unit; `when_none` without any.
+/// The median (of an even number of values, the upper one of the two in the middle); `when_none` if there are
+/// no values.
 template <class Value>
 Value median(std::vector<Value> values, Value when_none = 0) {
   return values.empty() ? when_none : value_of_rank(&values, values.size() / 2);
 }
 
-/// The middle of the values; of an even number the mean of the two in the middle. At least one value; by
-/// value, so also of a std::array.
+/// The median (of an even number of values, the mean of the two in the middle). There must be at least one
+/// value. The argument is copied, so a std::array works, too.
 template <class Values>
 auto mean_median(Values values) {
   const auto upper = value_of_rank(&values, values.size() / 2);
@@ -33,7 +35,8 @@ auto mean_median(Values values) {
   return (*std::max_element(values.begin(), middle) + upper) / 2;
 }
 
-/// The value that a share (0 … 1) of the others come before; `when_none` without any.
+/// The quantile at `share` (0 … 1): the value with that share of the others before it in sorted order;
+/// `when_none` if there are no values.
 template <class Value>
 Value quantile(std::vector<Value> values, double share, Value when_none = 0) {
   return values.empty()

@@ -8,8 +8,8 @@
 
 namespace limn {
 
-/// A list for a sentence: "left, right"; `when_none` without any. The items are texts, or things that have a
-/// `name`.
+/// A list of names for a sentence: "left, right"; `when_none` for an empty list. The items are strings or
+/// have a member `name`.
 template <class Items>
 std::string joined_names(const Items& items, std::string_view when_none = "none") {
   std::string list;
@@ -23,7 +23,7 @@ std::string joined_names(const Items& items, std::string_view when_none = "none"
   return list.empty() ? std::string(when_none) : list;
 }
 
-/// The first of the items that has this `name`; null when none has.
+/// The first item with this `name`; null when there is none.
 template <class Items>
 auto* find_named(Items& items, std::string_view name) {
   const auto found =

@@ -30,14 +30,14 @@ std::optional<Number> number_of(std::string_view text) {
   return value;
 }
 
-// OpenCV's own spelling of what is no number, too.
+// Also reads OpenCV's spelling of NaN and infinity.
 std::optional<double> element_of(std::string_view word) {
   if (word == ".Nan") return std::numeric_limits<double>::quiet_NaN();
   if (word == ".Inf" || word == "-.Inf") return word[0] == '-' ? -INFINITY : INFINITY;
   return number_of<double>(word);
 }
 
-// Separated by spaces or commas.
+// Numbers separated by spaces or commas.
 std::optional<std::vector<double>> elements_of(std::string_view list) {
   constexpr std::string_view k_between = " \t\r\n,";
   std::vector<double> numbers;
@@ -52,7 +52,7 @@ std::optional<std::vector<double>> elements_of(std::string_view list) {
 }
 
 Error no_numbers(const std::string& name) {
-  return error("{}: expected a whole list of numbers as a matrix's data, found something else.", name);
+  return error("{}: expected a complete list of numbers as the matrix's data, found something else.", name);
 }
 
 // The text between quotes, or all of it.
@@ -80,7 +80,7 @@ struct YamlLine {
   std::size_t number = 0;
 };
 
-// Without empty lines, comments and the document's own marks.
+// The lines without empty lines, comments and document markers.
 std::vector<YamlLine> yaml_lines(std::string_view text) {
   std::vector<YamlLine> lines;
   for (std::size_t number = 1; !text.empty(); ++number) {
@@ -104,7 +104,7 @@ std::optional<YamlMember> yaml_member(std::string_view line) {
   return YamlMember{trimmed(line.substr(0, colon)), trimmed(line.substr(colon + 1))};
 }
 
-// The members rows, cols and data of the indented lines below a name, if they are a matrix's.
+// The matrix in the indented lines below a name (members rows, cols and data), if they are a matrix.
 Result<Value> yaml_matrix(const std::string& name, std::span<const YamlLine> lines) {
   Value value;
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -167,7 +167,7 @@ Result<Value> json_value(const std::string& name, const Json& node) {
 }
 
 Result<Values> parse_json(const std::string& text) {
-  constexpr int k_depth = 8;  // what lies deeper is none of ours
+  constexpr int k_depth = 8;  // the values that Limn needs lie above this depth
   Json json;
   try {
     json = Json::parse(
@@ -187,11 +187,11 @@ Result<Values> parse_json(const std::string& text) {
 
 struct XmlElement {
   std::string_view name, inside;
-  std::size_t end = 0;  // behind its closing tag
+  std::size_t end = 0;  // offset after its closing tag
 };
 
-// The first element at or after `from`, comments and declarations left out; an element without a name when
-// there is none. nullopt when it does not end.
+// The first element at or after `from`; comments and declarations are skipped. If there is none, an element
+// without a name. Nullopt when the element has no end.
 std::optional<XmlElement> xml_element(std::string_view text, std::size_t from) {
   std::string_view name;
   std::size_t inside = 0;

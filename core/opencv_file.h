@@ -9,18 +9,18 @@
 
 namespace limn {
 
-/// What stands at the top level of a file that cv::FileStorage wrote, by name: scalars and matrices; lists
-/// and maps are left out. Read by ourselves because OpenCV 4.6 dies of some damaged files (XML whose tags do
-/// not match, matrices whose size is no number).
+/// The scalars and matrices at the top level of a file that cv::FileStorage wrote, by name; lists and maps
+/// are left out. Limn has its own reader because OpenCV 4.6 crashes on some damaged files (XML with tags that
+/// do not match, matrices with a size that is not a number).
 class OpencvFile {
  public:
   struct Value {
-    std::string text;             ///< of a scalar, without its quotes
-    std::vector<double> numbers;  ///< of a matrix, row by row
+    std::string text;             ///< The text of a scalar, without quotes.
+    std::vector<double> numbers;  ///< The elements of a matrix, row by row.
     int rows = 0, cols = 0;
   };
 
-  /// YAML, XML or JSON. Errors say the line, for a caller who knows the file.
+  /// Reads YAML, XML or JSON. Error messages say the line; the caller adds the file's name.
   static Result<OpencvFile> parse(const std::string& text);
 
   /// Null when absent.

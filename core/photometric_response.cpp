@@ -16,14 +16,14 @@ namespace {
 namespace fs = std::filesystem;
 using OrderedJson = nlohmann::ordered_json;
 
-constexpr double k_map_unit = 1.0 / 4096;  // of a map's level: half the noise of what 8-bit images can tell
+constexpr double k_map_unit = 1.0 / 4096;  // one level of a map: half the noise of 8-bit measurements
 constexpr std::uint16_t k_no_value = 65535;
 
 // ---- reading
 
 void check_curve(const ConfigNode& node, const std::vector<double>& curve) {
   if (curve.size() < 2 || !std::is_sorted(curve.begin(), curve.end()))
-    node.problem("expected curves of at least 2 numbers that never fall.");
+    node.problem("expected curves of at least 2 numbers that never fall (from black to full light).");
 }
 
 std::optional<double> optional_number(const ConfigNode& node, const char* key) {
@@ -109,7 +109,7 @@ Result<cv::Mat> load_map(const fs::path& path, double unit, int width, int heigh
 
 // ---- writing
 
-// Seven digits: more would be noise, and other compilers' last digits.
+// Seven digits: further ones are noise and differ between compilers.
 double rounded(double value) { return std::round(value * 1e7) / 1e7; }
 
 OrderedJson rounded(const std::vector<double>& values) {
@@ -253,7 +253,7 @@ Result<ColourMixing> load_mixing(const fs::path& response_json,
     return mixing;
   }
   LIMN_TRY_STATUS(config.status());
-  return error("{}: mixing: expected {} seen by {}, found no such entry. Capture response pictures of it.",
+  return error("{}: mixing: expected {} seen by {}, found no such entry. Capture response images of it.",
                response_json.string(), projector, camera);
 }
 

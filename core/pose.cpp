@@ -24,7 +24,7 @@ bool Pose::is_finite() const { return rotation.coeffs().allFinite() && translati
 
 Eigen::Quaterniond exp_rotation(const Eigen::Vector3d& w) {
   const double angle = w.norm();
-  // sin(angle / 2) / angle, by its series where the quotient loses its digits
+  // sin(angle / 2) / angle, by its series where the quotient loses precision
   const double scale = angle < 1e-4 ? 0.5 - angle * angle / 48 : std::sin(angle / 2) / angle;
   return Eigen::Quaterniond(std::cos(angle / 2), scale * w.x(), scale * w.y(), scale * w.z());
 }

@@ -35,14 +35,14 @@ Eigen::Quaterniond exp_rotation(const Eigen::Vector3d& w);
 Eigen::Vector3d log_rotation(const Eigen::Quaterniond& q);
 
 /// Left perturbation in the axes of a: delta = [w; v], R' = Exp(w) R, t' = t + v. Every 6x6 covariance in
-/// Limn is the covariance of this delta; its lower block is therefore that of the position of b's origin in
-/// a. (docs/decisions/0002-pose-perturbation.md says why v does not ride on the rotation.)
+/// Limn is the covariance of this delta; so its lower block is the covariance of the position of b's origin
+/// in a. (docs/decisions/0002-pose-perturbation.md says why v is independent of the rotation.)
 Pose boxplus(const Pose& a_from_b, const Vector6d& delta);
-/// delta such that boxplus(from, delta) == to.
+/// The delta for which boxplus(from, delta) == to.
 Vector6d boxminus(const Pose& to, const Pose& from);
 
-/// From `from` (t = 0) to `to` (t = 1): shortest arc for the rotation, straight line for b's origin. t
-/// outside [0, 1] extrapolates.
+/// The pose between `from` (t = 0) and `to` (t = 1): the rotation takes the shortest arc, b's origin moves on
+/// a straight line. t outside [0, 1] extrapolates.
 Pose interpolated(const Pose& from, const Pose& to, double t);
 
 /// Angle between two orientations, radians in [0, pi].

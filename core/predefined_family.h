@@ -6,16 +6,16 @@
 
 namespace limn {
 
-/// A marker family that OpenCV's predefined dictionaries hold.
+/// A marker family from OpenCV's predefined dictionaries.
 struct PredefinedFamily {
-  std::string_view name;  ///< Limn's: OpenCV's in lower case, `aruco_4x4_50`, `apriltag_36h11`
-  int opencv_dictionary;  ///< OpenCV's number, cv::aruco::PREDEFINED_DICTIONARY_NAME
+  std::string_view name;  ///< OpenCV's name in lower case: `aruco_4x4_50`, `apriltag_36h11`.
+  int opencv_dictionary;  ///< OpenCV's number, cv::aruco::PREDEFINED_DICTIONARY_NAME.
 };
 
-/// All of them.
+/// All predefined families.
 std::span<const PredefinedFamily> predefined_families();
 
-/// The one of that name; null when there is none.
+/// The family of that name; null when there is none.
 const PredefinedFamily* find_predefined_family(std::string_view name);
 
 }  // namespace limn

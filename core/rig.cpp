@@ -50,7 +50,7 @@ std::vector<Imager> read_imagers(const ConfigNode& root,
       node.problem(fmt::format("name: expected a name without '/', found \"{}\".", name));
     }
     if (!names->insert(name).second)
-      node.problem(fmt::format("name: \"{}\" stands twice in this rig.", name));
+      node.problem(fmt::format("name: \"{}\" is used twice in this rig.", name));
   }
   return imagers;
 }
@@ -67,7 +67,7 @@ std::vector<Focus> read_focuses(const ConfigNode& root) {
   return focuses;
 }
 
-// What was measured beside the rig, if anything.
+// Reads the measured responses beside the rig, if there are any.
 Status add_responses(const fs::path& folder, Rig* rig) {
   if (std::error_code ignored; !fs::exists(folder / "response.json", ignored)) return {};
   LIMN_TRY(RigResponses responses, load_responses(folder / "response.json"));

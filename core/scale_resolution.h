@@ -5,8 +5,8 @@
 
 namespace limn {
 
-/// Gives a rig's cameras and projectors this share (0 … 1) of their pixels a side. Error, as a sentence
-/// without a place: a share that is none, or that does not leave a device its shape.
+/// Multiplies the width and height of all of the rig's cameras and projectors by `share` (0 … 1). Error: a
+/// share outside this range, or one that changes a device's aspect ratio. The message has no file name.
 Status scale_resolution(double share, Rig* rig);
 
 }  // namespace limn

@@ -6,10 +6,10 @@
 
 namespace limn {
 
-/// An 8-bit image whose values are proportional to light, as screens want it: sRGB.
+/// Converts an 8-bit image with values proportional to light to sRGB, as screens expect it.
 cv::Mat srgb_image(const cv::Mat& linear);
 
-/// Whether a response was measured of the camera and is linear: then its images are too dark for screens.
+/// Whether the camera's response was measured and is linear. Such images look too dark on a screen.
 bool is_measured_linear(const Rig& rig, const Imager& camera);
 
 }  // namespace limn

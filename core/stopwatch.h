@@ -6,7 +6,7 @@
 
 namespace limn {
 
-/// How long something took, by the wall.
+/// Wall time since `begun`.
 inline double milliseconds_since(Stamp begun) {
   return 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
 }

@@ -6,8 +6,8 @@
 
 namespace limn {
 
-/// The folder for what Limn keeps of one person: $XDG_CONFIG_HOME/limn, else ~/.config/limn. Error: neither
-/// variable says where.
+/// The folder for a user's own settings: $XDG_CONFIG_HOME/limn, else ~/.config/limn. Error: neither
+/// XDG_CONFIG_HOME nor HOME is set.
 Result<std::filesystem::path> user_folder();
 
 }  // namespace limn

@@ -4,7 +4,7 @@
 
 namespace limn {
 
-/// The version of this build, "X.Y.Z", as the top CMakeLists.txt states it.
+/// The version of this build, "X.Y.Z", from the top CMakeLists.txt.
 std::string_view version();
 
 }  // namespace limn

@@ -10,7 +10,7 @@ constexpr int k_worker_nice = 10;
 
 }  // namespace
 
-// Linux: a thread has its own.
+// On Linux each thread has its own nice value.
 void step_back(int nice) { static_cast<void>(setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), nice)); }
 
 WorkerThread::WorkerThread() : thread_([this] { run(); }) {}

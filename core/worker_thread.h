@@ -8,11 +8,10 @@
 
 namespace limn {
 
-/// How many jobs may wait.
+/// Largest number of waiting jobs.
 constexpr std::size_t k_most_jobs = 32;
 
-/// Does what takes long, one thing after the other, on a thread of its own that goes after the others: files
-/// are read, images encoded.
+/// Runs long jobs one after another on its own low-priority thread, such as reading files or encoding images.
 class WorkerThread {
  public:
   WorkerThread();
@@ -20,9 +19,10 @@ class WorkerThread {
   WorkerThread(const WorkerThread&) = delete;
   WorkerThread& operator=(const WorkerThread&) = delete;
 
-  /// False: too much waits, and the job is dropped. A job must not throw.
+  /// Queues a job. False: too many jobs wait, or close() was called; the job is dropped. A job must not
+  /// throw.
   bool take(std::function<void()> job);
-  /// Drops what has not begun, waits for what has, and takes nothing more.
+  /// Drops the jobs that have not begun, waits for a running one, and accepts no more.
   void close();
 
  private:
@@ -35,7 +35,7 @@ class WorkerThread {
   std::thread thread_;
 };
 
-/// The calling thread goes after others: projectors first. `nice` as for nice(1).
+/// Lowers the priority of the calling thread, so that projectors come first. `nice` is as for nice(1).
 void step_back(int nice);
 
 }  // namespace limn

@@ -6,15 +6,15 @@
 
 namespace limn::device {
 
-/// A camera's address in the network.
+/// A camera's network address.
 struct Address {
   std::string host, port, path;
-  std::string login;  ///< NAME:PASSWORD, empty without
-  std::string shown;  ///< for messages: without the login
+  std::string login;  ///< NAME:PASSWORD; empty: none.
+  std::string shown;  ///< The address without the login, for messages.
 };
 
-/// Takes `SCHEME://[NAME:PASSWORD@]HOST[:PORT][/PATH]` apart; an IPv6 host stands in brackets. Error:
-/// anything else, with the form.
+/// Parses `SCHEME://[NAME:PASSWORD@]HOST[:PORT][/PATH]`; an IPv6 host is in brackets. The error for anything
+/// else names this form.
 Result<Address> parse_address(const std::string& url,
                               const std::string& scheme,
                               const std::string& default_port);

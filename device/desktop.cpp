@@ -29,7 +29,7 @@ Monitor described(GLFWmonitor* monitor) {
 
 }  // namespace
 
-// Ends GLFW with the last copy.
+// Ends GLFW when the last copy is destroyed.
 struct Desktop::Impl {
   Impl() = default;
   Impl(const Impl&) = delete;
@@ -39,9 +39,10 @@ struct Desktop::Impl {
 
 Result<Desktop> Desktop::open() {
   glfwGetError(nullptr);
-  glfwGetPrimaryMonitor();  // refuses while GLFW is not there: who has it is not kept twice
+  glfwGetPrimaryMonitor();  // fails when GLFW is not initialised, so no flag of our own is needed
   if (glfwGetError(nullptr) != GLFW_NOT_INITIALIZED)
-    return error("desktop: expected to be the only one in this program, found another. Pass that one on.");
+    return error(
+        "desktop: expected to be the only one in this program, found another. Pass that one on instead.");
   if (!glfwInit()) {
     return error("desktop: expected a display, found none ({}). Log in to a desktop or set DISPLAY.",
                  glfw_problem());
@@ -50,7 +51,7 @@ Result<Desktop> Desktop::open() {
 }
 
 std::vector<std::pair<Monitor, GLFWmonitor*>> list_monitors() {
-  glfwPollEvents();  // what was plugged in or out since
+  glfwPollEvents();  // updates the list of monitors
   int count = 0;
   GLFWmonitor** list = glfwGetMonitors(&count);
   std::vector<std::pair<Monitor, GLFWmonitor*>> monitors;

@@ -10,23 +10,24 @@
 
 namespace limn::device {
 
-/// An output of the desktop as it is fed.
+/// An output of the desktop, in its present mode.
 struct Monitor {
-  std::string name;  ///< the output's (`HDMI-1`); a second of the same name is `NAME#2`, left before right
-  cv::Size size;     ///< of the mode it is in, pixels
-  cv::Size largest;  ///< of the modes it has: what it is built for, mostly
+  std::string
+      name;       ///< The output's name (`HDMI-1`); a second one of the same name, from the left: `NAME#2`.
+  cv::Size size;  ///< Pixels of the present mode.
+  cv::Size largest;  ///< Pixels of the largest mode, which is mostly the native one.
   int refresh_hz = 0;
-  cv::Point position;  ///< of its top left pixel on the desktop
+  cv::Point position;  ///< Position of its top left pixel on the desktop.
 };
 
-/// The desktop that windows and monitors belong to (X or Wayland, through GLFW). One at a time in a program;
-/// copies are the same one, and what was opened on it keeps it alive. Belongs to the main thread.
+/// The desktop that windows and monitors belong to (X or Wayland, through GLFW). A program has one at a time;
+/// copies refer to the same one, and everything opened on it keeps it alive. Use it only on the main thread.
 class Desktop {
  public:
-  /// Error without a display, and while one is open: pass that one on.
+  /// Error without a display. Also an error while a desktop is open: use a copy of that one.
   static Result<Desktop> open();
 
-  /// What is plugged in now and shows a part of the desktop.
+  /// The monitors that are plugged in now and show a part of the desktop.
   std::vector<Monitor> monitors() const;
   std::optional<Monitor> find(const std::string& name) const;
 

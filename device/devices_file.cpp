@@ -25,7 +25,7 @@ cv::Size size_of(const ConfigNode& node) {
   return size;
 }
 
-// Files are named from the devices file; addresses stay as they are.
+// Paths are relative to the devices file; addresses stay unchanged.
 std::string source_of(const ConfigNode& node, const std::filesystem::path& folder) {
   const std::string source = node.text();
   const std::size_t colon = source.find(':');
@@ -59,7 +59,7 @@ device::DisplayConfig read_display(const ConfigNode& node) {
   return display;
 }
 
-// A problem at the second of two whose `key` is the same.
+// Records a problem at the second of two items with the same `key`.
 template <class Item, class Key>
 void refuse_twins(const std::vector<Item>& items,
                   const std::vector<ConfigNode>& nodes,
@@ -69,17 +69,17 @@ void refuse_twins(const std::vector<Item>& items,
     for (std::size_t j = 0; j < i; ++j)
       if (key(items[i]) == key(items[j]))
         nodes[i].problem(
-            fmt::format("expected a {} of its own, found {}, which {} has already. Change one of them.", what,
+            fmt::format("expected a {} of its own, found {}, which {} already has. Change one of them.", what,
                         key(items[i]), items[j].name));
 }
 
 Error size_differs(const Devices& devices, const std::string& name, cv::Size found, const Imager& imager) {
   return error(
-      "{}: {}: expected the rig's size {}x{}, found {}x{}. Calibrate it at this size, or take the rig's.",
+      "{}: {}: expected the rig's size {}x{}, found {}x{}. Calibrate it at this size, or use the rig's size.",
       devices.file.string(), name, imager.width, imager.height, found.width, found.height);
 }
 
-// Each of the rig's imagers must be among the devices.
+// Each imager of the rig must be among the devices.
 template <class Item>
 Status all_there(const Devices& devices,
                  const std::vector<Item>& items,
@@ -88,8 +88,8 @@ Status all_there(const Devices& devices,
   for (const Imager& imager : imagers)
     if (!find_named(items, imager.name))
       return error(
-          "{}: {}: expected the rig's {} among them, found it nowhere. Add it, or take the rig of these "
-          "devices.",
+          "{}: {}: expected the rig's {} among them, found no device of that name. Add it, or use the rig of "
+          "these devices.",
           devices.file.string(), key, imager.name);
   return {};
 }
@@ -118,7 +118,7 @@ Result<Devices> load_devices(const std::filesystem::path& path) {
     for (std::size_t j = 0; j < i; ++j) {
       const std::string& monitor = devices.displays[i].monitor;
       if (monitor == devices.displays[j].monitor && monitor != "offscreen" && monitor != "window")
-        displays[i].problem(fmt::format("expected a monitor of its own, found {}, which {} has already.",
+        displays[i].problem(fmt::format("expected a monitor of its own, found {}, which {} already has.",
                                         monitor, devices.displays[j].name));
     }
   LIMN_TRY_STATUS(config.status());

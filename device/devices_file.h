@@ -11,7 +11,7 @@
 
 namespace limn::apps {
 
-/// The cameras, displays and keys of a place (limn.devices/1).
+/// The cameras, displays and keys of an installation (limn.devices/1).
 struct Devices {
   std::filesystem::path file;
   std::vector<device::CameraConfig> cameras;
@@ -19,13 +19,14 @@ struct Devices {
   std::vector<device::KeysConfig> keys = {};
 };
 
-/// Reads a devices file; paths of images and videos are relative to its folder. Errors name the place:
-/// unknown or missing keys, a name used twice, two cameras of one source, two displays on one monitor.
+/// Reads a devices file; paths of images and videos are relative to its folder. Errors name the key: unknown
+/// or missing keys, a name used twice, two cameras with one source, two displays on one monitor.
 Result<Devices> load_devices(const std::filesystem::path& path);
 
-/// The devices with the sizes of the rig's imagers of their names, so that opening them refuses others.
-/// Error: names of either that the other has not, or a size in the file that is not the rig's. Displays
-/// beyond the rig's projectors (a large screen) are left as they are.
+/// The devices with the image sizes of the rig's imagers of the same names, so that opening them refuses
+/// other sizes. Error: a camera without an imager in the rig, an imager without a device, or a size in the
+/// file that differs from the rig's. Displays that are not projectors of the rig (a large screen) do not
+/// change.
 Result<Devices> matched(const Devices& devices, const Rig& rig);
 
 }  // namespace limn::apps

@@ -8,7 +8,7 @@
 
 namespace limn::device {
 
-/// Where images go: a projector's output, a screen, a virtual projector.
+/// A device that images are shown on: a projector, a screen, a virtual projector.
 class Display {
  public:
   virtual ~Display() = default;
@@ -18,8 +18,8 @@ class Display {
   /// Width and height that every image must have.
   virtual cv::Size size() const = 0;
   /// Shows an 8-bit grey or BGR image until the next call. Returns the moment at which its light leaves the
-  /// device (`shown_at`), which may lie ahead. Error when the image's size or type is wrong or the device
-  /// is gone.
+  /// device (`shown_at`), which may be in the future. Error when the image's size or type is wrong or the
+  /// device is gone.
   virtual Result<Stamp> show(const cv::Mat& image) = 0;
 };
 

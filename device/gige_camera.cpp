@@ -21,9 +21,9 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr int k_buffers = 4;
-constexpr guint k_socket_frames = 4;  // that the kernel may hold (as far as net.core.rmem_max lets it)
+constexpr guint k_socket_frames = 4;  // frames of socket buffer (net.core.rmem_max may allow less)
 constexpr double k_oldest_stamp_s = 1;
-constexpr auto k_longest_release = std::chrono::seconds(1);  // of a camera that may be gone, at the end
+constexpr auto k_longest_release = std::chrono::seconds(1);  // wait of the destructor for a lost camera
 
 template <class Object>
 struct Unref {
@@ -32,7 +32,7 @@ struct Unref {
 template <class Object>
 using Owned = std::unique_ptr<Object, Unref<Object>>;
 
-// Collects what a call of Aravis complains of.
+// Collects the error of an Aravis call.
 class Complaint {
  public:
   Complaint() = default;
@@ -50,12 +50,12 @@ class Complaint {
   GError* error_ = nullptr;
 };
 
-// A pixel format that we read, and what turns it into an image.
+// A supported pixel format and its conversion to an image.
 struct Format {
   ArvPixelFormat format;
   const char* name;
-  int type;             // of the raw image
-  int to_bgr, to_grey;  // cv::ColorConversionCodes; -1: as it is
+  int type;             // OpenCV type of the raw image
+  int to_bgr, to_grey;  // cv::ColorConversionCodes; -1: no conversion
 };
 
 // GenICam names a Bayer pattern by its first two pixels, OpenCV by the second row's second and third.
@@ -69,7 +69,7 @@ constexpr Format k_formats[] = {
     {ARV_PIXEL_FORMAT_RGB_8_PACKED, "RGB8", CV_8UC3, cv::COLOR_RGB2BGR, cv::COLOR_RGB2GRAY},
 };
 
-// The first of our formats that the camera has: brightness first when `grey`, else last.
+// The first supported format that the camera has. Mono8 comes first when `grey`, else last.
 Result<const Format*> chosen_format(ArvCamera* camera, bool grey) {
   guint count = 0;
   Complaint complaint;
@@ -83,7 +83,7 @@ Result<const Format*> chosen_format(ArvCamera* camera, bool grey) {
   if (mono && (grey || colour == std::end(k_formats))) return &k_formats[0];
   if (colour != std::end(k_formats)) return colour;
   return error(
-      "expected a camera with Mono8, 8-bit Bayer, RGB8 or BGR8, found none of them among its {} formats.",
+      "expected a camera with Mono8, 8-bit Bayer, RGB8 or BGR8, found none of these among its {} formats.",
       count);
 }
 
@@ -130,29 +130,31 @@ std::vector<CameraSetting> locked(ArvCamera* camera, const SensorSettings& wante
   if (wanted.exposure_ms) settings.push_back(locked_exposure(camera, *wanted.exposure_ms));
   if (wanted.gain) settings.push_back(locked_gain(camera, *wanted.gain));
   if (wanted.white_balance_k)
-    settings.push_back({"white_balance_k", *wanted.white_balance_k, std::nullopt,
-                        "white_balance_k is nothing that GigE Vision cameras have: remove the key."});
+    settings.push_back(
+        {"white_balance_k", *wanted.white_balance_k, std::nullopt,
+         "white_balance_k is a setting that GigE Vision cameras do not have: remove the key."});
   return settings;
 }
 
-// The region as it stands, or one of `size` in the middle of the sensor, read back.
+// Sets a region of `size` in the middle of the sensor (empty: leaves the present one) and reads it back.
 Result<cv::Size> set_region(ArvCamera* camera, cv::Size size) {
   Complaint complaint;
   int x = 0, y = 0, width = 0, height = 0;
   if (!size.empty()) {
     int sensor_width = 0, sensor_height = 0;
     arv_camera_get_sensor_size(camera, &sensor_width, &sensor_height, &complaint);
-    x = std::max(0, (sensor_width - size.width) / 2) & ~15;  // cameras want multiples
+    x = std::max(0, (sensor_width - size.width) / 2) & ~15;  // cameras require multiples
     y = std::max(0, (sensor_height - size.height) / 2) & ~15;
     if (!complaint.any()) arv_camera_set_region(camera, x, y, size.width, size.height, &complaint);
     if (complaint.any())
-      return error("expected a region of {}x{} to be taken, found: {}. Use a size that the camera has.",
-                   size.width, size.height, complaint.text());
+      return error(
+          "expected the camera to accept a region of {}x{}, found: {}. Use a size that the camera supports.",
+          size.width, size.height, complaint.text());
   }
   arv_camera_get_region(camera, &x, &y, &width, &height, &complaint);
   if (complaint.any()) return error("its region cannot be read: {}.", complaint.text());
   if (!size.empty() && cv::Size(width, height) != size)
-    return error("expected a region of {}x{}, the camera says {}x{}. Use a size that the camera has.",
+    return error("expected a region of {}x{}, the camera says {}x{}. Use a size that the camera supports.",
                  size.width, size.height, width, height);
   return cv::Size(width, height);
 }
@@ -170,10 +172,12 @@ Result<Session> begun(const std::string& id, const GigeCameraOptions& options, c
   Complaint complaint;
   session.camera.reset(arv_camera_new(id.empty() ? nullptr : id.c_str(), &complaint));
   if (!session.camera)
-    return error("{}. Is it switched on, on this network, and free? limn doctor lists who answers.",
-                 complaint.text());
+    return error(
+        "{}. Check that it is switched on, on this network and not in use; limn doctor lists cameras that "
+        "answer.",
+        complaint.text());
   ArvCamera* camera = session.camera.get();
-  // Raw packet sockets need rights that people have not, and see nothing on a loopback.
+  // Raw packet sockets need special rights and do not work on a loopback interface.
   if (arv_camera_is_gv_device(camera))
     arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   LIMN_TRY(session.format, chosen_format(camera, options.grey));
@@ -219,7 +223,7 @@ Result<cv::Mat> decoded(ArvBuffer* buffer, const Format& format, cv::Size size, 
   return image;
 }
 
-// Aravis stamps by the wall clock.
+// Aravis' times are those of the wall clock.
 Stamp arrival(ArvBuffer* buffer) {
   return from_wall_clock(std::chrono::nanoseconds(arv_buffer_get_system_timestamp(buffer)), k_oldest_stamp_s);
 }
@@ -229,10 +233,10 @@ Stamp arrival(ArvBuffer* buffer) {
 struct GigeCamera::Impl {
   std::string id;
   GigeCameraOptions options;
-  cv::Size size;  // as asked for, or as at first
+  cv::Size size;  // the requested size, or the first frame's
   Retry retry;
   std::optional<Session> session;
-  std::future<void> is_released;  // the session before; not valid: there was none
+  std::future<void> is_released;  // release of the former session; not valid if there was none
   long openings = 0, dropped = 0, damaged = 0;
 
   ~Impl() {
@@ -246,27 +250,29 @@ struct GigeCamera::Impl {
   Result<Frame> next();
 };
 
-// Aravis asks a camera that is gone for seconds before it lets go of it: that goes on beside what follows.
+// Aravis takes seconds to release a lost camera, because it waits for answers. So that runs on its own
+// thread.
 void GigeCamera::Impl::end(bool lost) {
   if (!session) return;
   std::promise<void> released;
   is_released = released.get_future();
   std::thread([last = std::move(session), lost, released = std::move(released)]() mutable {
     Complaint complaint;
-    if (!lost) arv_camera_stop_acquisition(last->camera.get(), &complaint);  // a lost one is not told
+    if (!lost) arv_camera_stop_acquisition(last->camera.get(), &complaint);  // a lost camera gets no command
     last.reset();
     released.set_value();
   }).detach();
   session.reset();
 }
 
-// Whether the session before has let go of the camera by then: it would take the next one's control with it.
+// Waits until the former session has released the camera; false when it has not by `deadline`. A late release
+// would end the next session's control of the camera.
 bool GigeCamera::Impl::may_begin(Stamp deadline) {
   return !is_released.valid() || is_released.wait_until(deadline) == std::future_status::ready;
 }
 
-// The newest filled buffer; older ones go back unread, and all of them when the reader was away for so long
-// that what came later found no room. Null when none came in time.
+// The newest filled buffer; older ones are given back unread. If all buffers are full, newer frames were
+// lost, so all are given back and the next frame is awaited. Null when none came in time.
 ArvBuffer* GigeCamera::Impl::newest(Stamp deadline) {
   ArvStream* stream = session->stream.get();
   for (;;) {
@@ -323,7 +329,7 @@ Result<Frame> GigeCamera::Impl::next() {
       retry.note_failure("it sends no frame. Check its cable, trigger mode and the firewall.");
     }
   }
-  return error("{} (gige:{}): expected a picture within {:g} s, found none: {}", options.name, id,
+  return error("{} (gige:{}): expected an image within {:g} s, found none: {}", options.name, id,
                options.limit_s, retry.problem());
 }
 
@@ -338,7 +344,8 @@ Result<GigeCamera> GigeCamera::open(const std::string& id, const GigeCameraOptio
   impl->options = options;
   impl->size = options.size;
   auto first = impl->next();
-  // A search takes a second by itself and may have used up the limit; the camera is then there, though.
+  // A search takes a second and may use up the limit although the camera was found; then a second try is
+  // made.
   if (!first && impl->session) first = impl->next();
   if (!first) return first.error();
   return GigeCamera(std::move(impl));

@@ -9,22 +9,22 @@
 namespace limn::device {
 
 struct GigeCameraOptions {
-  std::string name = "camera0";  ///< what the frames are called
-  cv::Size size = {};          ///< a region of this size in the sensor's middle; empty: as the camera stands
-  SensorSettings sensor = {};  ///< white_balance_k: no such thing in GigE Vision, it is said so in settings()
-  bool grey = false;           ///< brightness alone: Mono8 where the camera has it
-  double limit_s = 2;          ///< next() returns by then, with a frame or an error; 1 s later after a search
+  std::string name = "camera0";  ///< The camera's name in its frames.
+  cv::Size size = {};  ///< A region of this size in the sensor's middle; empty: the camera's present region.
+  SensorSettings sensor = {};  ///< GigE Vision has no white_balance_k; settings() then reports a problem.
+  bool grey = false;           ///< Grey frames only, from Mono8 if the camera has it.
+  double limit_s = 2;          ///< next() returns within this time; after a search up to 1 s later.
 };
 
-/// An industrial camera (GigE Vision; USB3 Vision goes the same way) through Aravis: Mono8, 8-bit Bayer, RGB8
-/// or BGR8. Stamps are the arrival of a frame's first packet as Aravis' own thread saw it, less half the
-/// exposure. Of the frames that wait only the newest is decoded. A lost camera is searched for again, after
-/// 0.1 s, doubling to 2 s, once Aravis has let go of it. At its end a camera that is gone holds nobody up for
-/// more than a second.
+/// An industrial camera (GigE Vision, also USB3 Vision) through Aravis, with Mono8, 8-bit Bayer, RGB8 or
+/// BGR8. `captured_at` is the arrival of a frame's first packet, as recorded by Aravis' own thread, minus
+/// half the exposure. Of several waiting frames only the newest is decoded. After Aravis has released a lost
+/// camera, it is searched for again, first after 0.1 s, then at intervals that double up to 2 s. The
+/// destructor waits at most one second for a lost camera.
 class GigeCamera : public CameraSource {
  public:
-  /// `id` as Aravis has it (`Vendor-Model-Serial`), or the camera's IP address; empty: the first that
-  /// answers. Errors: nobody of that id, another program holds it, no format of ours, no frame in time.
+  /// `id` is Aravis' name of the camera (`Vendor-Model-Serial`) or its IP address; empty: the first camera
+  /// that answers. Errors: no such camera, another program uses it, no supported format, no frame in time.
   static Result<GigeCamera> open(const std::string& id, const GigeCameraOptions& options = {});
   GigeCamera(GigeCamera&&) noexcept;
   GigeCamera& operator=(GigeCamera&&) noexcept;
@@ -34,7 +34,7 @@ class GigeCamera : public CameraSource {
   cv::Size size() const override;
   Result<Frame> next() override;
   std::string description() const override;
-  /// What was asked for: as the camera says after setting.
+  /// The requested settings with the values that the camera then reports.
   std::vector<CameraSetting> settings() const override;
 
  private:

@@ -16,7 +16,7 @@ struct GlContext::Impl {
   std::string description;
   bool is_robust = false, is_lost = false;
 
-  // The display stays initialised: it is the process's, and other contexts may live on it.
+  // The display stays initialised: it belongs to the whole process, and other contexts may use it.
   ~Impl() {
     if (context == EGL_NO_CONTEXT) return;
     if (eglGetCurrentContext() == context) {
@@ -37,8 +37,9 @@ bool has_word(const char* list, const char* word) {
   return false;
 }
 
-// Displays to try: hardware devices, software devices, then Mesa without a surface; `apart`: that before the
-// software devices. Mesa's software has its threads by display.
+// EGL displays to try: hardware devices, software devices, then Mesa without a surface. With `own_threads`
+// the last comes before the software devices: Mesa's software renderer has separate threads for each EGL
+// display.
 std::vector<EGLDisplay> candidate_displays(bool own_threads) {
   std::vector<EGLDisplay> displays;
   std::ptrdiff_t hardware = 0;
@@ -64,7 +65,7 @@ std::vector<EGLDisplay> candidate_displays(bool own_threads) {
   return displays;
 }
 
-// One that tells when it is lost, where the driver has such.
+// Creates a context that reports its loss if the driver supports that, else an ordinary one.
 EGLContext create_context(EGLDisplay display, bool* is_robust) {
   EGLint major = 0, minor = 0;
   if (!eglInitialize(display, &major, &minor) || !eglBindAPI(EGL_OPENGL_API)) return EGL_NO_CONTEXT;
@@ -96,7 +97,7 @@ GlContext::~GlContext() = default;
 Result<GlContext> GlContext::create(bool own_threads) {
   constexpr const char* k_advice =
       "Install a driver (Debian: libegl1 and libgl1-mesa-dri for software rendering).";
-  // epoxy ends the process when the library itself is missing, so ask for it first.
+  // epoxy ends the process when the library is missing, so its presence is checked first.
   if (!dlopen("libEGL.so.1", RTLD_LAZY | RTLD_GLOBAL)) {
     return error("OpenGL: expected the library libEGL.so.1, found none. {}", k_advice);
   }
@@ -112,7 +113,7 @@ Result<GlContext> GlContext::create(bool own_threads) {
     return GlContext(std::move(impl));
   }
   return error(
-      "OpenGL: expected an EGL device with desktop OpenGL 4.5, found {} EGL displays and none that gives it. "
+      "OpenGL: expected an EGL device with desktop OpenGL 4.5, found {} EGL displays, none of which has it. "
       "{}",
       displays.size(), k_advice);
 }
@@ -123,7 +124,8 @@ void GlContext::make_current() const {
 }
 
 bool GlContext::is_lost() const {
-  if (glGetGraphicsResetStatus() != GL_NO_ERROR) impl_->is_lost = true;  // told until the reset is over
+  if (glGetGraphicsResetStatus() != GL_NO_ERROR)
+    impl_->is_lost = true;  // reported only until the reset ends, so it is stored
   return impl_->is_lost;
 }
 

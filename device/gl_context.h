@@ -8,25 +8,25 @@
 namespace limn::device {
 
 /// A desktop OpenGL 4.5 core context without a window, through EGL: hardware devices first, then software
-/// ones, then Mesa without a surface. Current on the calling thread from creation on; what it owns in GL must
-/// be destroyed before it.
+/// ones, then Mesa without a surface. It is current on the calling thread after creation. GL objects in it
+/// must be destroyed before it.
 class GlContext {
  public:
-  /// Error when the machine has no EGL, or none that gives OpenGL 4.5; it says what was tried. `apart`: where
-  /// software draws, by other threads than for contexts that are not, of the calling thread's priority, so
-  /// that neither waits for the other's drawing.
+  /// Error when the machine has no EGL or no OpenGL 4.5; it says what was tried. `own_threads` matters for
+  /// software rendering only: the context then gets its own worker threads with the calling thread's
+  /// priority, so that it and other contexts do not wait for each other.
   static Result<GlContext> create(bool own_threads = false);
   GlContext(GlContext&&) noexcept;
   GlContext& operator=(GlContext&&) noexcept;
   ~GlContext();
 
-  /// Makes it current on the calling thread again, after a window's.
+  /// Makes the context current on the calling thread again, after a window's context.
   void make_current() const;
-  /// Whether the driver has given the context up (a GPU reset, its driver replaced). Then nothing is drawn
-  /// any more; calls stay harmless. Let go of what lives in it, then of it, and create another. Must be
-  /// current; always false where the driver cannot tell (is_robust).
+  /// Whether the context is lost (GPU reset, driver replaced). Then nothing is drawn any more, but calls are
+  /// harmless. Destroy its GL objects and then the context, and create another. The context must be current.
+  /// Always false if the driver does not report a loss (is_robust).
   bool is_lost() const;
-  /// Whether the driver promised to tell.
+  /// Whether the driver reports the loss of the context.
   bool is_robust() const;
   /// GL_RENDERER and GL_VERSION, for reports: "llvmpipe (LLVM 15.0.6, 256 bits), 4.5 (Core Profile)
   /// Mesa 22.3.6".

@@ -14,7 +14,7 @@
 namespace limn::device {
 namespace {
 
-// Remembers the EGL context that is current and makes it current again at the end.
+// Stores the current EGL context and makes it current again in its destructor.
 class ContextKept {
  public:
   ContextKept()
@@ -39,7 +39,7 @@ class ContextKept {
   EGLSurface draw_, read_;
 };
 
-// Makes a window's context current, and what was current before at the end.
+// Makes a window's context current, and in its destructor the former one.
 class Current {
  public:
   explicit Current(GLFWwindow* window) { glfwMakeContextCurrent(window); }
@@ -58,18 +58,19 @@ std::string glfw_problem() {
 
 Result<GlfwSurface> GlfwSurface::open(const Options& options) {
   const ContextKept kept;  // GLFW makes the new window's context current for a moment, then none
-  // One API for windows and headless images.
+  // Windows use EGL, as contexts without a window do.
   glfwWindowHint(GLFW_CONTEXT_CREATION_API, GLFW_EGL_CONTEXT_API);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
-  glfwWindowHint(GLFW_AUTO_ICONIFY, GLFW_FALSE);  // several full screens stay, whichever has the keys
+  glfwWindowHint(GLFW_AUTO_ICONIFY,
+                 GLFW_FALSE);  // full screens stay visible when they lose the keyboard focus
   glfwWindowHint(GLFW_REFRESH_RATE, options.monitor ? options.refresh_hz : GLFW_DONT_CARE);
   GlfwSurface surface;
   surface.window_ =
       glfwCreateWindow(options.width, options.height, options.title.c_str(), options.monitor, nullptr);
   if (!surface.window_)
-    return error("window: expected one with OpenGL 4.5, the display gives none ({}).", glfw_problem());
+    return error("window: expected a window with OpenGL 4.5, the display gives none ({}).", glfw_problem());
   const Current current(surface.window_);
   glfwSwapInterval(options.vsync ? 1 : 0);
   return surface;
@@ -115,7 +116,8 @@ void GlfwSurface::upload(const cv::Mat& image) {
   glTextureSubImage2D(texture_, 0, 0, 0, size_.width, size_.height, GL_BGR, GL_UNSIGNED_BYTE, bgr.data);
 }
 
-// The image as large as fits, centred. Its first row is the texture's first, so the window's y is turned.
+// Draws the image as large as fits, centred. The image's first row is at v = 0, so the window's y is
+// inverted.
 void GlfwSurface::draw() const {
   const cv::Size window = pixels();
   glBindFramebuffer(GL_FRAMEBUFFER, 0);

@@ -14,30 +14,32 @@ struct GLFWmonitor;
 
 namespace limn::device {
 
-/// A GLFW window with one image in it, scaled to fit with black bars. GLFW must be there (Desktop). Its own
-/// GL context is current only inside its functions; what was current before is current again after.
+/// A GLFW window with one image in it, scaled to fit with black bars. GLFW must be initialised (Desktop). The
+/// window's own GL context is current only inside its functions; afterwards the former context is current
+/// again.
 class GlfwSurface {
  public:
   struct Options {
     std::string title;
     int width = 0, height = 0;
-    GLFWmonitor* monitor = nullptr;  ///< full screen on it, in the mode it is in
-    int refresh_hz = 0;              ///< of that mode; another one of its size would be set
-    bool vsync = true;               ///< for the monitor's next refresh at each swap
+    GLFWmonitor* monitor = nullptr;  ///< Full screen on this monitor, in its present mode; null: a window.
+    int refresh_hz = 0;              ///< Refresh rate of that mode; another value would change the mode.
+    bool vsync = true;               ///< Whether each swap waits for the monitor's next refresh.
   };
   static Result<GlfwSurface> open(const Options& options);
   GlfwSurface(GlfwSurface&& other) noexcept;
   GlfwSurface& operator=(GlfwSurface&& other) noexcept;
   ~GlfwSurface();
 
-  /// Uploads an 8-bit grey or BGR image and draws it. With `finished`, waits until the driver has swapped.
+  /// Uploads an 8-bit grey or BGR image and draws it. With `wait_for_swap` it waits until the driver has
+  /// swapped.
   void show(const cv::Mat& image, bool wait_for_swap = false);
   void redraw() const;
-  /// Calls `paint` with its context current and its framebuffer bound, then swaps.
+  /// Calls `paint` with the window's context current and its framebuffer bound, then swaps.
   void draw_with(const std::function<void(cv::Size pixels)>& paint) const;
-  /// Calls `work` with its context current.
+  /// Calls `work` with the window's context current.
   void in_context(const std::function<void()>& work) const;
-  /// Pixels that it draws on.
+  /// Size of the framebuffer in pixels.
   cv::Size pixels() const;
   GLFWwindow* window() const { return window_; }
 
@@ -47,13 +49,14 @@ class GlfwSurface {
   void draw() const;
   GLFWwindow* window_ = nullptr;
   unsigned texture_ = 0, framebuffer_ = 0;
-  cv::Size size_;  // of the image
+  cv::Size size_;  // size of the image
 };
 
-/// What GLFW complained of last.
+/// The text of GLFW's last error.
 std::string glfw_problem();
 
-/// The monitors that are plugged in now (Desktop::monitors()), and what GLFW calls them until the next event.
+/// The monitors that are plugged in now (Desktop::monitors()) with GLFW's handles, which are valid until the
+/// next event.
 std::vector<std::pair<Monitor, GLFWmonitor*>> list_monitors();
 
 }  // namespace limn::device

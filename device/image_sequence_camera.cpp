@@ -19,7 +19,7 @@ Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path
   std::error_code problem;
   if (fs::is_regular_file(path, problem)) return std::vector<fs::path>{path};
   if (!fs::is_directory(path, problem))
-    return error("{}: expected a picture or a folder of pictures, found nothing there. Check the path.",
+    return error("{}: expected an image or a folder of images, found nothing there. Check the path.",
                  path.string());
   std::vector<fs::path> images;
   for (const auto& entry : fs::directory_iterator(path, problem))
@@ -27,7 +27,7 @@ Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path
   if (problem)
     return error("{}: cannot be listed: {}. Check its permissions.", path.string(), problem.message());
   if (images.empty())
-    return error("{}: expected .png or .jpg pictures, found none. Name the folder that holds the frames.",
+    return error("{}: expected .png or .jpg images, found none. Give the folder that contains the frames.",
                  path.string());
   std::sort(images.begin(), images.end());
   return images;
@@ -47,12 +47,12 @@ Result<ImageSequenceCamera> ImageSequenceCamera::open(const std::filesystem::pat
 
 Result<Frame> ImageSequenceCamera::next() {
   if (!options_.repeat && shown_ >= images_.size())
-    return error("{}: all {} pictures have been played.", options_.name, images_.size());
+    return error("{}: all {} images have been played.", options_.name, images_.size());
   const std::filesystem::path& path = images_[shown_ % images_.size()];
   LIMN_TRY(cv::Mat image, read_image(path));
   if (image.size() != size_)
     return error(
-        "{}: expected {}x{} like the first picture of the folder, found {}x{}. Keep other pictures "
+        "{}: expected {}x{} like the first image of the folder, found {}x{}. Keep other images "
         "elsewhere.",
         path.string(), size_.width, size_.height, image.cols, image.rows);
   const double seconds = static_cast<double>(shown_++) / options_.frames_per_second;
@@ -60,7 +60,7 @@ Result<Frame> ImageSequenceCamera::next() {
 }
 
 std::string ImageSequenceCamera::description() const {
-  return fmt::format("{} stored pictures, {}x{}, {:g} a second", images_.size(), size_.width, size_.height,
+  return fmt::format("{} stored images, {}x{}, {:g} per second", images_.size(), size_.width, size_.height,
                      options_.frames_per_second);
 }
 

@@ -8,14 +8,14 @@
 namespace limn::device {
 
 struct ImageSequenceCameraOptions {
-  std::string name = "camera0";   ///< what the frames are called
-  double frames_per_second = 30;  ///< spacing of the stamps; nothing is waited for
-  bool repeat = false;            ///< start again after the last image instead of ending
+  std::string name = "camera0";   ///< The camera's name in its frames.
+  double frames_per_second = 30;  ///< Determines the frames' stamps only; next() never waits.
+  bool repeat = false;            ///< Whether to start again after the last image instead of ending.
 };
 
-/// A camera that plays stored images: every PNG and JPEG of a folder in the order of their names, or one
-/// file. Stamps start at the session clock's zero and advance by the frame period, so that a replay is the
-/// same each time.
+/// A camera that plays stored images: all PNGs and JPEGs of a folder in the order of their names, or one
+/// file. Stamps start at the session clock's zero and advance by the frame period, so that each replay is the
+/// same.
 class ImageSequenceCamera : public CameraSource {
  public:
   /// Errors: no such path, no image in the folder, first image unreadable.
@@ -24,7 +24,7 @@ class ImageSequenceCamera : public CameraSource {
 
   const std::string& name() const override { return options_.name; }
   cv::Size size() const override { return size_; }
-  /// Error at the end, for an unreadable image and for one of another size than the first.
+  /// Error after the last image, for an unreadable image, and for an image of another size than the first.
   Result<Frame> next() override;
   bool is_finite() const override { return !options_.repeat; }
   std::string description() const override;
@@ -34,7 +34,7 @@ class ImageSequenceCamera : public CameraSource {
   ImageSequenceCameraOptions options_;
   std::vector<std::filesystem::path> images_;
   cv::Size size_;
-  std::size_t shown_ = 0;  // frames handed out so far
+  std::size_t shown_ = 0;  // number of frames returned so far
 };
 
 }  // namespace limn::device

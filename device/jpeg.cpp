@@ -12,9 +12,10 @@
 namespace limn::device {
 namespace {
 
-constexpr long k_max_pixels = 200'000'000;  // of the largest sensors; more is a damaged header
+constexpr long k_max_pixels = 200'000'000;  // the largest sensors have this; more means a damaged header
 
-// libjpeg carries on behind what it warns of: bytes between segments cost nothing, all else costs image.
+// After a warning libjpeg continues. Extra bytes between segments are harmless; other faults damage the
+// image.
 bool is_harmless(const std::string& warning) {
   return warning.find("extraneous bytes before marker") != std::string::npos;
 }
@@ -28,11 +29,11 @@ Handle new_decoder() {
 }
 
 Error damaged(std::span<const std::uint8_t> bytes, const Handle& decoder) {
-  return error("expected a whole JPEG picture, found a truncated or damaged one ({} bytes: {}).",
+  return error("expected a complete JPEG image, found a truncated or damaged one ({} bytes: {}).",
                bytes.size(), tjGetErrorStr2(decoder.get()));
 }
 
-// Whether what the decoder warned of cost no image.
+// Whether the image is complete in spite of the decoder's warning.
 bool is_whole(const Handle& decoder) {
   return tjGetErrorCode(decoder.get()) == TJERR_WARNING && is_harmless(tjGetErrorStr2(decoder.get()));
 }
@@ -53,14 +54,14 @@ Result<Header> read_header(std::span<const std::uint8_t> bytes,
     return damaged(bytes, decoder);
   header.size = {width, height};
   if (!options.size.empty() && header.size != options.size)
-    return error("expected a picture of {}x{}, found {}x{}. Set the camera back or start again.",
+    return error("expected an image of {}x{}, found {}x{}. Reset the camera's size or start again.",
                  options.size.width, options.size.height, width, height);
   if (static_cast<long>(width) * height > k_max_pixels)
-    return error("expected a camera's picture, found one of {}x{} pixels.", width, height);
+    return error("expected an image of at most 200 megapixels, found one of {}x{} pixels.", width, height);
   return header;
 }
 
-// Brightness and the two differences of colour, each of its own resolution.
+// The luma plane and the two chroma planes, each at its own resolution.
 using Planes = std::array<cv::Mat, 3>;
 
 Result<Planes> decode_planes(std::span<const std::uint8_t> bytes,
@@ -95,7 +96,7 @@ cv::Mat coloured(const Planes& planes, const Header& header, const Handle& decod
   return image;
 }
 
-// The largest n/8 of a size that has no side longer than that.
+// The largest n/8 of a size with no side longer than `longest_side`.
 cv::Size reduced(cv::Size size, int longest_side) {
   if (longest_side <= 0) return size;
   for (int eighths = 8; eighths > 1; --eighths) {

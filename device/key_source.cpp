@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::chrono::seconds k_retry{1};
 
-// GLFW's codes: letters are their capitals, other keys from 256 on.
+// GLFW's codes: letters are upper-case ASCII, other keys start at 256.
 std::optional<int> code_of(int key) {
   static constexpr std::pair<int, int> k_codes[] = {
       {KEY_RIGHT, 262},    {KEY_LEFT, 263}, {KEY_DOWN, 264},  {KEY_UP, 265},  {KEY_PAGEUP, 266},
@@ -39,7 +39,8 @@ Result<int> opened(const KeysConfig& config) {
     return error("{}: {}: expected an input device, found: {}. {}", config.name, config.path.string(),
                  std::strerror(errno), advice);
   }
-  ::ioctl(file, EVIOCGRAB, 1);  // else its keys go to the window in front, too; not every file can do it
+  // Without this the focused window gets the keys, too. It fails harmlessly for a file that is not a device.
+  ::ioctl(file, EVIOCGRAB, 1);
   return file;
 }
 
@@ -87,7 +88,7 @@ Result<std::vector<int>> KeySource::poll_pressed_keys() {
       tried_at_ = now;
       return error("{}", why_gone_);
     }
-    constexpr int k_down = 1;  // 0: let go, 2: held down
+    constexpr int k_down = 1;  // 0 is a release, 2 a repetition
     if (event.type != EV_KEY || event.value != k_down) continue;
     if (const auto code = code_of(event.code)) keys.push_back(*code);
   }

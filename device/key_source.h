@@ -9,16 +9,17 @@
 
 namespace limn::device {
 
-/// A presentation clicker, pedal or keyboard by its input device of Linux (evdev).
+/// The configuration of a presentation clicker, pedal or keyboard as a Linux input device (evdev).
 struct KeysConfig {
   std::string name;
-  std::filesystem::path path;  ///< `/dev/input/by-id/…-event-kbd` keeps to one device
+  std::filesystem::path path;  ///< `/dev/input/by-id/…-event-kbd` always means the same device.
 };
 
-/// Keys of one input device, whatever window has the focus. While it is open nobody else hears them.
+/// Keys of one input device, independent of the focused window. While it is open, other programs do not
+/// receive its keys.
 class KeySource {
  public:
-  /// Error: no such device, or no right to read it.
+  /// Error: no such device, or no permission to read it.
   static Result<KeySource> open(const KeysConfig& config);
   KeySource(KeySource&& other) noexcept;
   KeySource& operator=(KeySource&&) = delete;
@@ -26,8 +27,8 @@ class KeySource {
 
   const std::string& name() const { return config_.name; }
 
-  /// Keys pressed since the last call, GLFW's codes; never waits. Error: the device is gone; it is opened
-  /// again when it comes back, tried once a second.
+  /// The keys pressed since the last call, as GLFW codes; never waits. Error while the device is gone; once a
+  /// second it is tried to open it again.
   Result<std::vector<int>> poll_pressed_keys();
 
  private:

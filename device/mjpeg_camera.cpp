@@ -15,7 +15,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double k_draining_s = 0.1;  // of old bytes, before the newest image so far must do
+constexpr double k_draining_s =
+    0.1;  // longest reading of waiting bytes; then the newest image so far is used
 
 std::string base64(const std::string& bytes) {
   static constexpr char k_digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -31,7 +32,7 @@ std::string base64(const std::string& bytes) {
   return text;
 }
 
-// HTTP/1.0, so that a server has no reason to send in chunks.
+// The request uses HTTP/1.0, so that a server has no reason to send chunks.
 std::string request(const Address& address) {
   std::string text = fmt::format("GET {} HTTP/1.0\r\nHost: {}:{}\r\nUser-Agent: limn\r\nAccept: */*\r\n",
                                  address.path, address.host, address.port);
@@ -52,7 +53,7 @@ struct MjpegCamera::Impl {
   cv::Size size;
   std::optional<Connection> connection;
   Retry retry;
-  std::string fault;  // that ended a connection since the last image; "" without one
+  std::string fault;  // why a connection ended since the last image; empty: none ended
   long connections = 0, dropped = 0, damaged = 0;
 
   Status connect(Stamp deadline);
@@ -67,8 +68,8 @@ Status MjpegCamera::Impl::connect(Stamp deadline) {
   LIMN_TRY_STATUS(socket.send(request(address)));
   connection.emplace(Connection{std::move(socket), MjpegStream(options.max_part_bytes)});
   ++connections;
-  retry.note("the connection stands, but no whole picture has come." +
-             (fault.empty() ? "" : " Before: " + fault));
+  retry.note("the server is connected, but no complete image has arrived." +
+             (fault.empty() ? "" : " Earlier fault: " + fault));
   return {};
 }
 
@@ -81,7 +82,7 @@ void MjpegCamera::Impl::disconnect(const std::string& why) {
   retry.note_failure(why);
 }
 
-// Everything that has arrived goes to the stream; `heard` is set when that is anything.
+// Feeds everything that has arrived to the stream; sets `heard` if there was anything.
 Status MjpegCamera::Impl::read_waiting(bool* heard) {
   const Stamp until = shifted(Clock::now(), k_draining_s);
   do {
@@ -126,10 +127,10 @@ Result<Frame> MjpegCamera::Impl::next() {
     if (!read) {
       disconnect(read.message());
     } else if (!connection->socket.wait(deadline) && !heard) {
-      disconnect("the server is silent.");  // a pulled cable looks like this
+      disconnect("the server is silent.");  // for example an unplugged cable
     }
   }
-  return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, address.shown,
+  return error("{} ({}): expected an image within {:g} s, found none: {}", options.name, address.shown,
                options.limit_s, retry.problem());
 }
 
@@ -153,7 +154,7 @@ Result<Frame> MjpegCamera::next() { return impl_->next(); }
 
 std::string MjpegCamera::description() const {
   const long dropped = impl_->dropped + (impl_->connection ? impl_->connection->stream.dropped() : 0);
-  return fmt::format("MJPEG over HTTP, {}x{}; {} connections, {} pictures skipped for newer ones, {} damaged",
+  return fmt::format("MJPEG over HTTP, {}x{}; {} connections, {} images skipped for newer ones, {} damaged",
                      impl_->size.width, impl_->size.height, impl_->connections, dropped, impl_->damaged);
 }
 

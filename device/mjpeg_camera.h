@@ -7,20 +7,21 @@
 namespace limn::device {
 
 struct MjpegCameraOptions {
-  std::string name = "camera0";           ///< what the frames are called
-  bool grey = false;                      ///< brightness alone: half the decoding
-  double limit_s = 2;                     ///< next() returns by then, with a frame or an error
-  std::size_t max_part_bytes = 32 << 20;  ///< a larger image is an error, not memory
+  std::string name = "camera0";           ///< The camera's name in its frames.
+  bool grey = false;                      ///< Grey frames only, which halves the time of decoding.
+  double limit_s = 2;                     ///< next() returns within this time, with a frame or an error.
+  std::size_t max_part_bytes = 32 << 20;  ///< A larger image is an error, which limits the memory.
 };
 
 /// A network camera that sends JPEGs over HTTP (multipart/x-mixed-replace): most IP cameras, phones,
-/// mjpg-streamer. `captured_at` is the arrival of the image's first byte by the kernel's clock (exposure,
-/// compression and network lie before it). What waits in the socket is read at each call, and only the newest
-/// whole image is decoded. A lost or broken connection is made again, after 0.1 s, doubling to 2 s.
+/// mjpg-streamer. `captured_at` is the kernel's arrival time of the image's first byte, which is later than
+/// the exposure by the time of compression and network. Each call reads everything that waits in the socket
+/// and decodes only the newest complete image. A lost connection is made again, first after 0.1 s, then at
+/// intervals that double up to 2 s.
 class MjpegCamera : public CameraSource {
  public:
-  /// `http://[NAME:PASSWORD@]HOST[:PORT]/PATH`. Waits for the first image, whose size holds from then on.
-  /// Errors: another address, or none of a good image within the limit, and why.
+  /// Opens `http://[NAME:PASSWORD@]HOST[:PORT]/PATH` and waits for the first image; later ones must have its
+  /// size. Errors: another form of address, or no valid image within the limit, with the reason.
   static Result<MjpegCamera> open(const std::string& url, const MjpegCameraOptions& options = {});
   MjpegCamera(MjpegCamera&&) noexcept;
   MjpegCamera& operator=(MjpegCamera&&) noexcept;
@@ -28,8 +29,8 @@ class MjpegCamera : public CameraSource {
 
   const std::string& name() const override;
   cv::Size size() const override;
-  /// Broken images and lost connections are mended inside the limit; an error names the last fault. Looking
-  /// up a host's name is the one step that the limit does not bound (the resolver's own limits do).
+  /// After damaged images and lost connections it tries again within the limit; an error names the last
+  /// fault. The limit does not include the look-up of the host's name, which has the resolver's own limits.
   Result<Frame> next() override;
   std::string description() const override;
 

@@ -24,7 +24,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-// What stands there, short and printable.
+// The text, short and printable, for a message.
 std::string found(std::string_view text) {
   std::string shown;
   for (const char c : text.substr(0, 40)) shown += c >= ' ' && c <= '~' ? c : '.';
@@ -51,7 +51,7 @@ std::optional<std::size_t> number(std::string_view text, int base) {
   return value;
 }
 
-// The boundary parameter of a content type, without quotes and without the dashes that some servers put in.
+// The boundary parameter of a content type, without quotes and without the dashes that some servers add.
 std::string boundary_of(std::string_view content_type) {
   const std::size_t at = lower(content_type).find("boundary=");
   if (at == std::string::npos) return {};
@@ -63,7 +63,7 @@ std::string boundary_of(std::string_view content_type) {
   return std::string(value);
 }
 
-// Takes what stands before the first empty line; nullopt when that is still to come.
+// Removes and returns the text before the first empty line; nullopt when there is no empty line yet.
 std::optional<std::string> take_head(std::string* buffer) {
   std::size_t end = buffer->find("\r\n\r\n"), skip = 4;
   if (const std::size_t bare = buffer->find("\n\n"); bare < end) end = bare, skip = 2;
@@ -81,10 +81,10 @@ Status MjpegStream::read_answer(std::string_view head) {
     return error("expected an HTTP answer, found \"{}\". Check the port.", found(status));
   const std::string_view code = trimmed(status.substr(std::min<std::size_t>(9, status.size())));
   if (code.starts_with("401"))
-    return error("the server wants a name and password ({}). Give them: http://NAME:PASSWORD@HOST/.",
+    return error("the server requires a name and password ({}). Give them: http://NAME:PASSWORD@HOST/.",
                  found(status));
   if (code.starts_with("3"))
-    return error("the server sends on to {} ({}). Use that address.", found(field(head, "location")),
+    return error("the server redirects to {} ({}). Use that address.", found(field(head, "location")),
                  found(status));
   if (!code.starts_with("200"))
     return error("expected the answer 200, found \"{}\". Check the address's path.", found(status));
@@ -121,7 +121,7 @@ Status MjpegStream::unchunk(std::string_view bytes) {
       continue;
     }
     const std::string line = std::exchange(chunk_line_, {});
-    if (chunk_ == Chunk::end) {  // the line end behind a chunk's data
+    if (chunk_ == Chunk::end) {  // the end of line after a chunk's data
       chunk_ = Chunk::size;
       continue;
     }
@@ -138,8 +138,7 @@ Status MjpegStream::read_delimiter(std::string_view line) {
   if (line.empty()) return {};
   if (line == boundary_ + "--") return error("the server ended the stream.");
   if (line != boundary_)
-    return error("expected the boundary \"{}\" between pictures, found \"{}\".", found(boundary_),
-                 found(line));
+    return error("expected the boundary \"{}\" between images, found \"{}\".", found(boundary_), found(line));
   at_ = At::part_head;
   return {};
 }
@@ -161,7 +160,7 @@ Status MjpegStream::read_part_head(std::string_view head) {
   return {};
 }
 
-// The first bytes of the buffer are a whole image.
+// Keeps the first bytes of the buffer, a complete image, as the newest one.
 void MjpegStream::keep(std::size_t jpeg_bytes) {
   dropped_ += newest_ ? 1 : 0;
   newest_ = MjpegPart{buffer_.substr(0, jpeg_bytes), part_arrived_at_.value()};
@@ -190,7 +189,7 @@ Result<bool> MjpegStream::take_body(Stamp arrived_at) {
   return true;
 }
 
-// Understands one more thing of the buffer; false when more bytes are needed.
+// Parses the next element in the buffer; false when more bytes are needed.
 Result<bool> MjpegStream::step(Stamp arrived_at) {
   if (at_ == At::part_body) return take_body(arrived_at);
   if (at_ == At::delimiter) {
@@ -201,7 +200,7 @@ Result<bool> MjpegStream::step(Stamp arrived_at) {
     LIMN_TRY_STATUS(read_delimiter(trimmed(line)));
     return true;
   }
-  // A part without any header: its empty line follows the boundary at once.
+  // In a part without any header the empty line follows the boundary directly.
   if (at_ == At::part_head && buffer_.starts_with("\r\n")) buffer_.insert(0, "\r\n");
   const auto head = take_head(&buffer_);
   if (!head && buffer_.size() > k_max_head)
@@ -218,7 +217,7 @@ Result<bool> MjpegStream::step(Stamp arrived_at) {
 
 Status MjpegStream::feed(std::string_view bytes, Stamp arrived_at) {
   if (chunk_ == Chunk::none) buffer_ += bytes;
-  Status chunks;  // images before a bad chunk are still good
+  Status chunks;  // images before a bad chunk are still valid
   if (chunk_ != Chunk::none) chunks = unchunk(bytes);
   for (bool more = true; more;) {
     LIMN_TRY(more, step(arrived_at));

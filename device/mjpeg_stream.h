@@ -12,23 +12,23 @@ namespace limn::device {
 /// One image of a stream, as sent.
 struct MjpegPart {
   std::string jpeg;
-  Stamp arrived_at;  ///< of its first byte
+  Stamp arrived_at;  ///< Arrival of its first byte.
 };
 
-/// The answer of an HTTP server that sends JPEGs as multipart/x-mixed-replace, read as its bytes come in, cut
-/// anywhere. Keeps the newest whole image alone. Images end where their Content-Length says or, without
-/// one, at the next boundary; chunked answers are unwrapped. No sockets here.
+/// Reads the answer of an HTTP server that sends JPEGs as multipart/x-mixed-replace. The bytes may come in
+/// pieces of any length. Only the newest complete image is kept. Images end by their Content-Length or,
+/// without one, at the next boundary; chunked answers are decoded. This class uses no sockets.
 class MjpegStream {
  public:
   explicit MjpegStream(std::size_t max_part_bytes) : max_part_bytes_(max_part_bytes) {}
 
-  /// Error when these bytes cannot be such an answer (HTTP error, other content, bad boundary, part too
-  /// large, end of the stream); nothing more can be fed then. The message is a sentence without a place.
+  /// Reads more bytes. Error when they are not such an answer (HTTP error, other content, bad boundary, part
+  /// too large, end of the stream); then no more can be fed. The message does not name the camera.
   Status feed(std::string_view bytes, Stamp arrived_at);
   bool has_part() const { return newest_.has_value(); }
-  /// The newest whole image, once.
+  /// Returns the newest complete image and forgets it.
   std::optional<MjpegPart> take_newest();
-  /// Whole images that a newer one replaced before they were taken.
+  /// Number of complete images that a newer one replaced before they were taken.
   long dropped() const { return dropped_; }
 
  private:
@@ -45,13 +45,13 @@ class MjpegStream {
 
   std::size_t max_part_bytes_;
   At at_ = At::answer;
-  std::string buffer_;    // not yet understood
+  std::string buffer_;    // bytes that are not parsed yet
   std::string boundary_;  // with its leading dashes
   Chunk chunk_ = Chunk::none;
   std::string chunk_line_;
   std::size_t chunk_left_ = 0;
   std::optional<std::size_t> part_length_;
-  std::size_t searched_ = 0;  // of buffer_: no boundary begins before
+  std::size_t searched_ = 0;  // offset in buffer_ before which no boundary begins
   std::optional<Stamp> part_arrived_at_;
   std::optional<MjpegPart> newest_;
   long dropped_ = 0;

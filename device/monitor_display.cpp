@@ -15,7 +15,7 @@ namespace {
 
 using Handle = std::pair<Monitor, GLFWmonitor*>;
 
-// The monitor of that name in the mode of that size (any, when empty).
+// The monitor of that name, in a mode of that size (empty: any size).
 Result<Handle> found_monitor(const MonitorDisplayOptions& options) {
   std::string others;
   for (const Handle& found : list_monitors()) {
@@ -37,7 +37,7 @@ Result<Handle> found_monitor(const MonitorDisplayOptions& options) {
 struct MonitorDisplay::Impl {
   MonitorDisplayOptions options;
   Desktop desktop;
-  std::optional<GlfwSurface> surface;  // none while the monitor is away
+  std::optional<GlfwSurface> surface;  // none while the monitor is unplugged
 
   Status begin(const Handle& monitor);
   Result<Stamp> show(const cv::Mat& image);
@@ -64,7 +64,7 @@ Status MonitorDisplay::Impl::begin(const Handle& monitor) {
 Result<Stamp> MonitorDisplay::Impl::show(const cv::Mat& image) {
   LIMN_TRY_STATUS(check_image(image, options.name, options.size));
   const auto monitor = found_monitor(options);
-  // A window whose monitor has gone would stand on another one.
+  // A window whose monitor is gone would appear on another one.
   if (!monitor || (surface && glfwGetWindowMonitor(surface->window()) != monitor->second)) surface.reset();
   if (!monitor) return monitor.error();
   if (!surface) LIMN_TRY_STATUS(begin(*monitor));

@@ -9,18 +9,18 @@ namespace limn::device {
 
 struct MonitorDisplayOptions {
   std::string name = "projector0";
-  std::string monitor;   ///< its name on the desktop (limn doctor lists them)
-  cv::Size size = {};    ///< the rig's; a monitor in another mode is refused. Empty: as the monitor stands
-  double latency_s = 0;  ///< measured, from the swap to light
-  bool vsync = true;     ///< for the next refresh at each image; of several, let one wait
+  std::string monitor;   ///< The monitor's name on the desktop (limn doctor lists the names).
+  cv::Size size = {};    ///< The rig's size; another mode is an error. Empty: the monitor's present mode.
+  double latency_s = 0;  ///< Measured time from the swap to light.
+  bool vsync = true;  ///< Each image waits for the next refresh; enable it on only one of several displays.
 };
 
-/// A projector or screen, full screen in the mode it is in: an image's pixel is the device's. Belongs to the
-/// main thread. While the monitor is unplugged, or in another mode, nothing of it shows elsewhere and show()
-/// says so; it goes on when the monitor of that name is back.
+/// A projector or screen, full screen in its present mode: an image's pixels are the device's pixels. Use it
+/// only on the main thread. While the monitor is unplugged or in another mode, show() returns an error and
+/// nothing appears elsewhere. It continues when a monitor of that name is back.
 class MonitorDisplay : public Display {
  public:
-  /// Errors: no such monitor (lists those there are), another mode than the rig's size (both sizes), a
+  /// Errors: no such monitor (the message lists the monitors), a mode with another size than the rig's, a
   /// desktop that scales.
   static Result<MonitorDisplay> open(const Desktop& desktop, const MonitorDisplayOptions& options);
   MonitorDisplay(MonitorDisplay&&) noexcept;
@@ -29,7 +29,7 @@ class MonitorDisplay : public Display {
 
   const std::string& name() const override;
   cv::Size size() const override;
-  /// Uploads and swaps; the moment is when the driver had swapped, plus the latency.
+  /// Uploads the image and swaps. The returned moment is the end of the swap plus the latency.
   Result<Stamp> show(const cv::Mat& image) override;
 
  private:

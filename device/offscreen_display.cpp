@@ -6,9 +6,8 @@ namespace limn::device {
 
 Status check_image(const cv::Mat& image, const std::string& name, cv::Size size) {
   if (image.size() == size && (image.type() == CV_8UC1 || image.type() == CV_8UC3)) return {};
-  return error(
-      "{}: expected an 8-bit grey or BGR picture of {}x{}, found {}x{} with {} channels of {} bytes.", name,
-      size.width, size.height, image.cols, image.rows, image.channels(), image.elemSize1());
+  return error("{}: expected an 8-bit grey or BGR image of {}x{}, found {}x{} with {} channels of {} bytes.",
+               name, size.width, size.height, image.cols, image.rows, image.channels(), image.elemSize1());
 }
 
 Result<Stamp> OffscreenDisplay::show(const cv::Mat& image) {

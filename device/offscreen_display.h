@@ -6,7 +6,7 @@
 
 namespace limn::device {
 
-/// A display without light: it keeps the image that it was shown last.
+/// A display without light: it only stores the last image.
 class OffscreenDisplay : public Display {
  public:
   OffscreenDisplay(std::string name, cv::Size size, double latency_s = 0)
@@ -24,7 +24,7 @@ class OffscreenDisplay : public Display {
   cv::Mat image_;
 };
 
-/// Error unless a display of that name and size can show the image: 8-bit grey or BGR.
+/// Checks that a display of that name and size can show the image, which must be 8-bit grey or BGR.
 Status check_image(const cv::Mat& image, const std::string& name, cv::Size size);
 
 }  // namespace limn::device

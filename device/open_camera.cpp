@@ -12,9 +12,8 @@ namespace limn::device {
 namespace {
 
 constexpr const char* k_forms =
-    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, gige:ID, a video file, a picture, a "
-    "folder of "
-    "pictures";
+    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, gige:ID, a video file, an image, a "
+    "folder of images";
 
 using Opened = Result<std::unique_ptr<CameraSource>>;
 
@@ -35,19 +34,20 @@ Opened open_path(const CameraConfig& config) {
   const std::filesystem::path path = config.source;
   std::error_code problem;
   if (!std::filesystem::exists(path, problem))
-    return error("{}: expected a source as one of: {}; found {}, where there is nothing.", config.name,
-                 k_forms, config.source.empty() ? "an empty text" : config.source);
+    return error(
+        "{}: expected a source of one of these forms: {}; found {}, which is none of them and no file.",
+        config.name, k_forms, config.source.empty() ? "an empty text" : config.source);
   if (std::filesystem::is_directory(path, problem) || is_image(path))
     return on_heap(ImageSequenceCamera::open(path, {.name = config.name, .repeat = config.repeat}));
   return on_heap(VideoCamera::open_file(path, {.name = config.name, .grey = config.grey}));
 }
 
-// What has no settings that can be made from here.
+// Error if settings are configured for a source that has none.
 Status without_settings(const CameraConfig& config) {
   const SensorSettings& sensor = config.sensor;
   const char* key = sensor.exposure_ms ? "exposure_ms" : sensor.gain ? "gain" : "white_balance_k";
   if (!sensor.exposure_ms && !sensor.gain && !sensor.white_balance_k) return {};
-  return error("{}: {} cannot be set from here for {}. Set it on the camera itself and remove the key.",
+  return error("{}: {} cannot be set by Limn for {}. Set it on the camera itself and remove the key.",
                config.name, key, config.source);
 }
 

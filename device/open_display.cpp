@@ -13,7 +13,7 @@ namespace {
 
 using Opened = Result<std::unique_ptr<Display>>;
 
-// A display in a window: scaled to it, gone once the person closes it.
+// A display in a window: images are scaled to it; it ends when the person closes the window.
 class WindowDisplay : public Display {
  public:
   WindowDisplay(Window window, const DisplayConfig& config) : window_(std::move(window)), config_(config) {}
@@ -31,7 +31,7 @@ class WindowDisplay : public Display {
   DisplayConfig config_;
 };
 
-constexpr int k_window_width = 960;  // a larger one would hide the operator's
+constexpr int k_window_width = 960;  // a larger window would hide the operator's
 
 Opened open_window(const DisplayConfig& config, const Desktop& desktop) {
   const int width = std::min(config.size.width, k_window_width);
@@ -49,7 +49,7 @@ bool needs_desktop(const DisplayConfig& config) { return config.monitor != "offs
 Result<std::unique_ptr<Display>> open_display(const DisplayConfig& config, const Desktop* desktop) {
   const bool monitor = config.monitor != "offscreen" && config.monitor != "window";
   if (!monitor && config.size.empty())
-    return error("{}: expected a size for the display {}, found none. Give it, or a rig.", config.name,
+    return error("{}: expected a size for the display {}, found none. Give a size or a rig.", config.name,
                  config.monitor);
   if (config.monitor == "offscreen")
     return Opened(std::make_unique<OffscreenDisplay>(config.name, config.size, config.latency_s));

@@ -34,7 +34,7 @@ bool wait_for(int fd, short events, Stamp deadline) {
   }
 }
 
-// The kernel's stamp of arrival, which is the wall clock's, on the monotonic clock.
+// The kernel's arrival time, converted from the wall clock to the monotonic clock.
 Stamp arrival(msghdr* message) {
   for (cmsghdr* item = CMSG_FIRSTHDR(message); item; item = CMSG_NXTHDR(message, item)) {
     if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_TIMESTAMPNS) continue;
@@ -46,7 +46,7 @@ Stamp arrival(msghdr* message) {
   return now();
 }
 
-// Waits for the answer to a connect() that was begun; 0 or the errno.
+// Waits for the result of a connect() that was begun; returns 0 or the errno.
 int finished_connecting(int fd, Stamp deadline) {
   if (!wait_for(fd, POLLOUT, deadline)) return ETIMEDOUT;
   int problem = 0;
@@ -62,7 +62,7 @@ Result<Socket> Socket::connect(const std::string& host, const std::string& port,
   wanted.ai_socktype = SOCK_STREAM;
   addrinfo* list = nullptr;
   if (const int problem = getaddrinfo(host.c_str(), port.c_str(), &wanted, &list); problem != 0)
-    return limn::error("the host {} is not known ({}). Check its name and the network.", host,
+    return limn::error("the host {} is unknown ({}). Check its name and the network.", host,
                        gai_strerror(problem));
   const std::unique_ptr<addrinfo, void (*)(addrinfo*)> addresses(list, freeaddrinfo);
   int problem = EADDRNOTAVAIL;
@@ -73,11 +73,12 @@ Result<Socket> Socket::connect(const std::string& host, const std::string& port,
     if (problem == EINPROGRESS) problem = finished_connecting(candidate.fd_, deadline);
     if (problem != 0) continue;
     const int on = 1;
-    setsockopt(candidate.fd_, SOL_SOCKET, SO_TIMESTAMPNS, &on, sizeof(on));  // without it: stamps of reading
+    setsockopt(candidate.fd_, SOL_SOCKET, SO_TIMESTAMPNS, &on,
+               sizeof(on));  // if it fails, arrival times are those of reading
     return candidate;
   }
-  return limn::error("{}:{} does not answer ({}). Is it switched on and on this network?", host, port,
-                     std::strerror(problem));
+  return limn::error("{}:{} does not answer ({}). Check that it is switched on and on this network.", host,
+                     port, std::strerror(problem));
 }
 
 Socket::Socket(Socket&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
@@ -90,7 +91,8 @@ Socket::~Socket() {
 }
 
 Status Socket::send(std::string_view text) {
-  // A request is far smaller than a fresh connection's buffer: it goes at once or the other side has gone.
+  // A request is far smaller than a new connection's buffer: it is sent at once, or the other side has
+  // closed.
   if (::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size())) return {};
   return limn::error("the request could not be sent ({}).", std::strerror(errno));
 }

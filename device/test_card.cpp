@@ -31,7 +31,7 @@ const char* sign_colour(int number) { return colour_of(number).name; }
 cv::Mat output_sign(cv::Size size, int number, const std::string& name) {
   cv::Mat image(size, CV_8UC3, colour_of(number).bgr);
   const auto write = [&](const std::string& text, double height, double baseline) {
-    const double scale = height * size.height / 22;  // Hershey's capitals are 22 pixels high
+    const double scale = height * size.height / 22;  // capitals of the Hershey font are 22 pixels high
     const int thickness = std::max(1, static_cast<int>(2 * scale));
     const int width = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr).width;
     const double fit = std::min(1.0, 0.9 * size.width / std::max(1, width));

@@ -5,12 +5,12 @@
 
 namespace limn::apps {
 
-/// What a display shows of itself: its number (from 1) on the number's colour, its name and size, a line
-/// around the edge, and a patch whose pixels take turns (grey and even where pixels are lit one by one, with
-/// a pattern in it where something scales).
+/// A test image that identifies a display: its number (from 1) on the number's colour, its name and size, a
+/// line around the edge, and a checkerboard of single pixels, which looks evenly grey unless something scales
+/// the image.
 cv::Mat output_sign(cv::Size size, int number, const std::string& name);
 
-/// The colour of a number, in a word.
+/// The name of a number's colour.
 const char* sign_colour(int number);
 
 }  // namespace limn::apps

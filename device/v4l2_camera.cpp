@@ -26,8 +26,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr unsigned k_buffers = 4;       // one is filled, one waits, one is read, one to spare
-constexpr double k_oldest_stamp_s = 1;  // an older stamp is not of a frame that has just come
+constexpr unsigned k_buffers = 4;       // one being filled, one waiting, one being read, one spare
+constexpr double k_oldest_stamp_s = 1;  // an older stamp cannot belong to a frame that has just arrived
 
 std::string fourcc(std::uint32_t format) {
   std::string text;
@@ -38,7 +38,7 @@ std::string fourcc(std::uint32_t format) {
   return text;
 }
 
-// The ioctls of one open device; closes it in the end.
+// An open device with its ioctls; closed by the destructor.
 class Device {
  public:
   Device(const V4l2System* system, int fd) : system_(system), fd_(fd) {}
@@ -48,7 +48,7 @@ class Device {
     if (fd_ >= 0) system_->close(fd_);
   }
 
-  /// The errno, 0 on success.
+  /// Makes an ioctl; returns 0 or the errno.
   template <class Argument>
   int ask(unsigned long request, Argument* argument) const {
     return system_->ioctl(fd_, request, argument) == 0 ? 0 : errno;
@@ -72,9 +72,9 @@ std::string advice_for(int problem) {
     case ENODEV:
       return "Plug it in again.";
     case ENOSPC:
-      return "Its USB controller has no room left: use another port or a smaller size.";
+      return "Its USB controller has no bandwidth left: use another port or a smaller size.";
     default:
-      return "Plug it out and in again.";
+      return "Unplug it and plug it in again.";
   }
 }
 
@@ -90,7 +90,8 @@ Result<Device> opened(const std::string& path, const V4l2System& system) {
 
 Result<v4l2_capability> capability(const Device& device) {
   v4l2_capability found{};
-  if (const int problem = device.ask(VIDIOC_QUERYCAP, &found)) return refused("asking what it is", problem);
+  if (const int problem = device.ask(VIDIOC_QUERYCAP, &found))
+    return refused("asking for its capabilities", problem);
   return found;
 }
 
@@ -112,7 +113,7 @@ std::vector<std::uint32_t> formats(const Device& device) {
   return found;
 }
 
-// The first of our formats that the device has.
+// The first supported format that the device has.
 Result<std::uint32_t> chosen_format(const Device& device, bool grey) {
   std::vector<std::uint32_t> ours = {V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_GREY};
   if (grey) std::rotate(ours.begin(), ours.end() - 1, ours.end());
@@ -133,7 +134,7 @@ bool same(const v4l2_pix_format& a, const v4l2_pix_format& b) {
   return a.pixelformat == b.pixelformat && a.width == b.width && a.height == b.height;
 }
 
-// Sets the format; what the driver answers, and what it says afterwards, must be what was asked.
+// Sets the format. The driver's answer and the format read back must both be the requested one.
 Result<v4l2_pix_format> set_format(const Device& device, std::uint32_t pixel_format, cv::Size size) {
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -150,7 +151,7 @@ Result<v4l2_pix_format> set_format(const Device& device, std::uint32_t pixel_for
   const v4l2_pix_format asked = pixels;
   if (const int problem = device.ask(VIDIOC_S_FMT, &format)) return refused("setting its format", problem);
   if (!same(asked, pixels))
-    return error("expected the format {}, the driver offers {}. Use a size that the camera has.",
+    return error("expected the format {}, the driver offers {}. Use a size that the camera supports.",
                  shown(asked), shown(pixels));
   if (const int problem = device.ask(VIDIOC_G_FMT, &format))
     return refused("reading its format back", problem);
@@ -160,7 +161,7 @@ Result<v4l2_pix_format> set_format(const Device& device, std::uint32_t pixel_for
   return pixels;
 }
 
-// A control that is locked: its automatism goes off, then its value is set and read back.
+// A control that can be locked: its automatic mode is switched off, then its value is set and read back.
 struct Lock {
   const char* name;
   std::uint32_t automatism;
@@ -209,7 +210,7 @@ CameraSetting locked(const Device& device, const Lock& lock, double asked) {
 std::vector<CameraSetting> locked(const Device& device, const SensorSettings& wanted) {
   std::vector<CameraSetting> settings;
   if (wanted.exposure_ms) {
-    v4l2_control steady{V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0};  // the rate does not give way to the exposure
+    v4l2_control steady{V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0};  // a long exposure must not lower the frame rate
     device.ask(VIDIOC_S_CTRL, &steady);
     settings.push_back(locked(device, k_exposure, *wanted.exposure_ms));
   }
@@ -218,7 +219,7 @@ std::vector<CameraSetting> locked(const Device& device, const SensorSettings& wa
   return settings;
 }
 
-// The memory that the driver fills.
+// The buffers that the driver fills.
 class Buffers {
  public:
   explicit Buffers(const V4l2System* system) : system_(system) {}
@@ -247,7 +248,7 @@ v4l2_buffer buffer_at(std::uint32_t index) {
   return buffer;
 }
 
-// Bytes that a raw frame needs; 1 for a compressed one.
+// Number of bytes of a raw frame; 1 for a compressed one.
 std::size_t least_bytes(const v4l2_pix_format& format) {
   if (format.pixelformat == V4L2_PIX_FMT_MJPEG) return 1;
   const std::size_t row = format.width * (format.pixelformat == V4L2_PIX_FMT_YUYV ? 2u : 1u);
@@ -295,8 +296,8 @@ Result<Session> begun(const std::string& path,
   LIMN_TRY(const v4l2_capability able, capability(device));
   if (!captures_video(able))
     return error(
-        "expected a camera, found a device that gives no pictures. Take its neighbour (limn doctor lists "
-        "them).");
+        "expected a camera, found a device that gives no images. Use another one of its devices (limn doctor "
+        "lists them).");
   LIMN_TRY(const std::uint32_t wanted, chosen_format(device, options.grey));
   LIMN_TRY(const v4l2_pix_format format, set_format(device, wanted, size));
   std::vector<CameraSetting> settings = locked(device, options.sensor);
@@ -311,7 +312,7 @@ cv::Mat from_yuyv(const cv::Mat& yuyv, bool grey) {
   return image;
 }
 
-// A frame without name and stamp.
+// Decodes a frame, without name and stamp.
 Result<Frame> decoded(const Buffers::Map& map, std::size_t bytes, const v4l2_pix_format& format, bool grey) {
   const cv::Size size(static_cast<int>(format.width), static_cast<int>(format.height));
   if (bytes > map.size || bytes < least_bytes(format))
@@ -360,7 +361,7 @@ struct V4l2Camera::Impl {
   std::string path;
   V4l2CameraOptions options;
   V4l2System system;
-  cv::Size size;  // as asked for, or as at first
+  cv::Size size;  // the requested size, or the first frame's
   Retry retry;
   std::optional<Session> session;
   Stamp last_stamp;
@@ -375,18 +376,19 @@ struct V4l2Camera::Impl {
   Result<Frame> next();
 };
 
-// Takes a filled buffer; `got` is false when none is ready.
+// Gets a filled buffer from the driver; `got` is false when none is ready.
 Status V4l2Camera::Impl::dequeue(v4l2_buffer* buffer, bool* got) {
   *buffer = buffer_at(0);
   const int problem = session->device.ask(VIDIOC_DQBUF, buffer);
   *got = problem == 0;
   if (problem != 0 && problem != EAGAIN) return refused("taking a frame", problem);
   if (*got && buffer->index >= session->buffers.maps().size())
-    return error("the driver names the buffer {} of {}.", buffer->index, session->buffers.maps().size());
+    return error("the driver names buffer {}, but there are only {}.", buffer->index,
+                 session->buffers.maps().size());
   return {};
 }
 
-// Gives a frame back unread.
+// Gives a buffer back to the driver unread.
 Status V4l2Camera::Impl::drop(v4l2_buffer* buffer) {
   ++dropped;
   if (const int problem = session->device.ask(VIDIOC_QBUF, buffer))
@@ -394,8 +396,8 @@ Status V4l2Camera::Impl::drop(v4l2_buffer* buffer) {
   return {};
 }
 
-// The newest frame; older ones go back unread, and all of them when the reader was away for so long that what
-// came later found no room.
+// The newest filled buffer; older ones are given back unread. If all buffers are full, newer frames were
+// lost, so all are given back and the next frame is awaited.
 Result<std::optional<v4l2_buffer>> V4l2Camera::Impl::newest(Stamp deadline) {
   for (;;) {
     const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
@@ -440,7 +442,7 @@ Stamp V4l2Camera::Impl::stamp_of(const v4l2_buffer& buffer) {
   return shifted(stamp, at_start ? half_exposure_s : -half_exposure_s);
 }
 
-// A frame; none when what came was damaged. Error: the session is broken.
+// The newest frame; none when it was damaged. Error: the session has failed.
 Result<std::optional<Frame>> V4l2Camera::Impl::grabbed(Stamp deadline) {
   LIMN_TRY(std::optional<v4l2_buffer> buffer, newest(deadline));
   if (!buffer) return std::optional<Frame>();
@@ -491,7 +493,7 @@ Result<Frame> V4l2Camera::Impl::next() {
       retry.note_failure(frame.message());
     }
   }
-  return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, path,
+  return error("{} ({}): expected an image within {:g} s, found none: {}", options.name, path,
                options.limit_s, retry.problem());
 }
 
@@ -519,8 +521,7 @@ Result<Frame> V4l2Camera::next() { return impl_->next(); }
 std::string V4l2Camera::description() const {
   const std::string format = impl_->session ? shown(impl_->session->format) : "lost";
   return fmt::format(
-      "V4L2, {}; opened {} times, {} frames skipped for newer ones, {} damaged, {} with a stamp that "
-      "cannot be",
+      "V4L2, {}; opened {} times, {} frames skipped for newer ones, {} damaged, {} with an impossible stamp",
       format, impl_->openings, impl_->dropped, impl_->damaged, impl_->odd_stamps);
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// A frame that came so much later than the quickest waited unread; there is a newer one.
+// s; a frame read this much after its arrival waited unread, so there is a newer one.
 constexpr double k_old_s = 0.05;
 
 }  // namespace
@@ -25,7 +25,7 @@ constexpr double k_old_s = 0.05;
 struct VideoCamera::Impl {
   VideoCameraOptions options;
   std::string source;              // path or address
-  std::optional<Address> address;  // of a stream
+  std::optional<Address> address;  // only for a stream
   cv::VideoCapture video;
   cv::Size size;
   Retry retry;
@@ -40,14 +40,14 @@ struct VideoCamera::Impl {
   Result<Frame> grab_newest(Stamp deadline);
 };
 
-// The image of the frame grabbed last.
+// Decodes the last grabbed frame.
 Result<cv::Mat> VideoCamera::Impl::retrieve() {
   cv::Mat image;
   if (!video.retrieve(image) || image.empty() || image.depth() != CV_8U)
-    return error("expected a frame of 8 bits, found one that cannot be decoded.");
+    return error("expected an 8-bit frame, found one that cannot be decoded.");
   if (!size.empty() && image.size() != size)
-    return error("expected {}x{} as at first, found {}x{}. Set it back or start again.", size.width,
-                 size.height, image.cols, image.rows);
+    return error("expected {}x{} as in the first frame, found {}x{}. Reset the camera's size or start again.",
+                 size.width, size.height, image.cols, image.rows);
   return options.grey ? to_grey(image) : image;
 }
 
@@ -59,7 +59,7 @@ Result<Frame> VideoCamera::Impl::next_of_file() {
   return Frame{options.name, *image, shifted(Stamp{}, video.get(cv::CAP_PROP_POS_MSEC) / 1000)};
 }
 
-// OpenCV says only that it could not: who is not there is told before.
+// OpenCV gives no reason for a failure, so the host's connection is tested first.
 Status VideoCamera::Impl::connect(Stamp deadline) {
   LIMN_TRY_STATUS(Socket::connect(address->host, address->port, deadline));
   const int left_ms = std::max(1, static_cast<int>(1000 * seconds_between(Clock::now(), deadline)));
@@ -73,15 +73,14 @@ Status VideoCamera::Impl::connect(Stamp deadline) {
   return catch_up(deadline);
 }
 
-// FFmpeg keeps what it read to find out the format: frames that come quicker than they were sent are from
-// there.
+// Skips the frames that FFmpeg buffered while it detected the format: they come faster than they were sent.
 Status VideoCamera::Impl::catch_up(Stamp deadline) {
   clock = {};
   std::optional<double> last_sent_s;
   Stamp last_read = Clock::now();
   const Stamp enough = shifted(last_read, 0.5 * seconds_between(last_read, deadline));
   while (last_read < enough) {
-    if (!video.grab()) return error("the stream broke off as it began.");
+    if (!video.grab()) return error("the stream ended at its start.");
     const double sent_s = video.get(cv::CAP_PROP_POS_MSEC) / 1000;
     const Stamp read_at = Clock::now();
     clock.stamp(sent_s, read_at);
@@ -91,13 +90,13 @@ Status VideoCamera::Impl::catch_up(Stamp deadline) {
     last_sent_s = sent_s;
     last_read = read_at;
   }
-  return {};  // its times tell nothing: stamps are those of reading
+  return {};  // the sender's times are unusable: stamps are the times of reading
 }
 
 // The newest frame of an open stream.
 Result<Frame> VideoCamera::Impl::grab_newest(Stamp deadline) {
   for (;;) {
-    if (!video.grab()) return error("the stream broke off, or was silent.");
+    if (!video.grab()) return error("the stream ended or was silent.");
     const Stamp now = Clock::now();
     const Stamp arrived_at = clock.stamp(video.get(cv::CAP_PROP_POS_MSEC) / 1000, now);
     if (seconds_between(arrived_at, now) > k_old_s && now < deadline) {
@@ -129,7 +128,7 @@ Result<Frame> VideoCamera::Impl::next_of_stream() {
     video.release();
     retry.note_failure(frame.message());
   }
-  return error("{} ({}): expected a picture within {:g} s, found none: {}", options.name, address->shown,
+  return error("{} ({}): expected an image within {:g} s, found none: {}", options.name, address->shown,
                options.limit_s, retry.problem());
 }
 
@@ -145,7 +144,7 @@ Result<VideoCamera> VideoCamera::open_file(const std::filesystem::path& path,
   impl->source = path.string();
   std::error_code problem;
   if (!std::filesystem::is_regular_file(path, problem))
-    return error("{}: expected a video file, found none there. Check the path.", path.string());
+    return error("{}: expected a video file, found no file. Check the path.", path.string());
   if (impl->video.open(path.string(), cv::CAP_FFMPEG) && impl->next_of_file()) {
     impl->size = cv::Size(static_cast<int>(impl->video.get(cv::CAP_PROP_FRAME_WIDTH)),
                           static_cast<int>(impl->video.get(cv::CAP_PROP_FRAME_HEIGHT)));

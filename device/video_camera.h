@@ -8,23 +8,24 @@
 namespace limn::device {
 
 struct VideoCameraOptions {
-  std::string name = "camera0";  ///< what the frames are called
-  bool grey = false;             ///< brightness alone
-  double limit_s = 2;  ///< of a stream: next() returns by then (twice that, when it breaks off late)
+  std::string name = "camera0";  ///< The camera's name in its frames.
+  bool grey = false;             ///< Grey frames only.
+  /// For a stream: next() returns within this time, or within twice the time if the stream ends late in it.
+  double limit_s = 2;
 };
 
 /// A video, read with OpenCV (FFmpeg): a file, or a network camera's RTSP stream over TCP.
 ///
-/// A file's stamps start at the session clock's zero and are the file's own frame times; nothing is waited
-/// for. A stream's are those of arrival (see VideoClock); frames that waited are passed over until the
-/// newest, and a lost stream is opened again, after 0.1 s, doubling to 2 s.
+/// A file's stamps are its own frame times, from the session clock's zero; next() never waits. A stream's
+/// stamps are arrival times (see VideoClock). Of several waiting frames only the newest is used, and a lost
+/// stream is opened again, first after 0.1 s, then at intervals that double up to 2 s.
 class VideoCamera : public CameraSource {
  public:
   /// Errors: no such file, no video in it.
   static Result<VideoCamera> open_file(const std::filesystem::path& path,
                                        const VideoCameraOptions& options = {});
-  /// `rtsp://[NAME:PASSWORD@]HOST[:PORT]/PATH`. Errors: another address, nobody there, no video within the
-  /// limit.
+  /// Opens `rtsp://[NAME:PASSWORD@]HOST[:PORT]/PATH`. Errors: another form of address, no answer, no video
+  /// within the limit.
   static Result<VideoCamera> open_rtsp(const std::string& url, const VideoCameraOptions& options = {});
   VideoCamera(VideoCamera&&) noexcept;
   VideoCamera& operator=(VideoCamera&&) noexcept;
@@ -32,7 +33,8 @@ class VideoCamera : public CameraSource {
 
   const std::string& name() const override;
   cv::Size size() const override;
-  /// Error at a file's end; of a stream, when no frame of the first one's size came within the limit.
+  /// Error at the end of a file. For a stream: error when no frame of the first one's size came within the
+  /// limit.
   Result<Frame> next() override;
   bool is_finite() const override;
   std::string description() const override;

@@ -6,9 +6,10 @@
 
 namespace limn::device {
 
-/// Where the wall clock's moment `since_epoch` lies on the monotonic clock. One that is to come, or more than
-/// `oldest_s` ago, means that the wall clock was set meanwhile: it gives this moment instead. Both clocks are
-/// read again when the process was held up between them, which would make everything seem to be earlier.
+/// Converts the wall clock's moment `since_epoch` to the monotonic clock. If it is in the future or more than
+/// `oldest_s` ago, the wall clock was set in between, and the current moment is returned instead. If the
+/// process was interrupted between reading the two clocks, both are read again, because the result would be
+/// too early.
 inline Stamp from_wall_clock(std::chrono::nanoseconds since_epoch, double oldest_s) {
   constexpr double k_at_once_s = 50e-6;
   Stamp read_at;

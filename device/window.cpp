@@ -11,7 +11,7 @@
 namespace limn::device {
 
 struct Window::Impl {
-  Desktop desktop;  // goes last
+  Desktop desktop;  // destroyed last
   GlfwSurface surface;
   bool escape_closes = true;
   int key = 0;
@@ -22,7 +22,7 @@ struct Window::Impl {
   static Impl& of(GLFWwindow* window) { return *static_cast<Impl*>(glfwGetWindowUserPointer(window)); }
 };
 
-// Events into `input`; this must stay where it is from then on.
+// From now on events are collected in `input`; this object must not move any more.
 void Window::Impl::listen() {
   GLFWwindow* const window = surface.window();
   glfwSetWindowUserPointer(window, this);

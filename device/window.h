@@ -15,30 +15,31 @@ namespace limn::device {
 struct WindowOptions {
   std::string title = "Limn";
   int width = 0, height = 0;
-  bool vsync = true;          ///< for the monitor's next refresh at each image
-  bool escape_closes = true;  ///< false: Escape is a key like any other
+  bool vsync = true;          ///< Whether each image waits for the monitor's next refresh.
+  bool escape_closes = true;  ///< If false, Escape is an ordinary key.
 };
 
-/// What a person did in a window since it was asked last.
+/// What a person did in a window since the last call of input().
 struct WindowInput {
   struct Key {
-    int code = 0;  ///< GLFW's; letters are upper-case ASCII
+    int code = 0;  ///< GLFW code; letters are upper-case ASCII.
     bool is_down = false;
   };
-  cv::Point2f pointer = {-1, -1};         ///< in the window's pixels; negative: outside
-  std::array<bool, 3> buttons = {};       ///< left, right, middle: held, or pressed meanwhile
-  float wheel = 0;                        ///< steps up
-  std::vector<Key> keys = {};             ///< pressed (or repeated) and let go, in order
-  std::vector<unsigned> characters = {};  ///< typed, Unicode
+  cv::Point2f pointer = {-1, -1};         ///< In the window's pixels; negative: outside.
+  std::array<bool, 3> buttons = {};       ///< Left, right, middle: held now, or pressed since the last call.
+  float wheel = 0;                        ///< Wheel steps upwards.
+  std::vector<Key> keys = {};             ///< Presses (also repetitions) and releases, in order.
+  std::vector<unsigned> characters = {};  ///< Typed Unicode characters.
 };
 
-/// A window on the desktop that shows images, scaled to fit with black bars. Belongs to the main thread.
-/// Its own GL context is current only inside its functions; what was current before is current again after.
+/// A window on the desktop that shows images, scaled to fit with black bars. Use it only on the main thread.
+/// Its own GL context is current only inside its functions; afterwards the former context is current again.
 class Window {
  public:
-  /// Error without a display (GLFW needs X or Wayland), and while a Desktop is open: pass that one on.
+  /// Opens a window with its own Desktop. Error without a display (GLFW needs X or Wayland), and while
+  /// another Desktop is open: use the other open() with that one.
   static Result<Window> open(const std::string& title, int width, int height);
-  /// One of several on a desktop, beside monitors.
+  /// Opens one of several windows on a desktop, which can also have monitors.
   static Result<Window> open(const Desktop& desktop, const WindowOptions& options);
   Window(Window&&) noexcept;
   Window& operator=(Window&&) noexcept;
@@ -46,21 +47,21 @@ class Window {
 
   /// Shows an 8-bit grey or BGR image from now on and handles pending events.
   void show(const cv::Mat& image);
-  /// Handles events and redraws its image; false once the person has closed the window or pressed Escape.
+  /// Handles events and redraws the image; false once the person has closed the window or pressed Escape.
   bool is_open();
-  /// The key pressed since the last call (GLFW's codes; letters are upper-case ASCII), 0 when none.
+  /// The key pressed since the last call (GLFW code; letters are upper-case ASCII), 0 when none.
   int poll_pressed_key();
 
-  /// Calls `paint` with the window's context current and its framebuffer bound, then shows what it drew;
+  /// Calls `paint` with the window's context current and its framebuffer bound, then shows the result. Use it
   /// instead of show().
   void draw(const std::function<void(cv::Size pixels)>& paint);
-  /// Calls `work` with the window's context current: for what lives in it.
+  /// Calls `work` with the window's context current, for work on GL objects in it.
   void in_context(const std::function<void()>& work);
-  /// Handles events; what was done since the last call.
+  /// Handles events and returns what the person did since the last call.
   WindowInput input();
-  /// False once the person has closed the window; nothing is drawn.
+  /// False once the person has closed the window. Draws nothing.
   bool is_wanted() const;
-  /// Pixels of a desktop's ordinary one, as large as the person has set.
+  /// The desktop's scale factor for the window: pixels per ordinary pixel, as the person has set it.
   float scale() const;
 
  private:

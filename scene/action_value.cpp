@@ -10,7 +10,7 @@ namespace limn::scene {
 namespace {
 
 constexpr double k_most_nudge_mm = 1000, k_most_split_mm = 5000, k_most_place_mm = 5000;
-constexpr double k_least_quaternion = 0.5, k_most_quaternion = 2;  // its length, which is made 1
+constexpr double k_least_quaternion = 0.5, k_most_quaternion = 2;  // accepted length; it is normalised to 1
 
 }  // namespace
 
@@ -68,7 +68,7 @@ Result<ScreenChoice> read_screen(const Edit& edit) {
   return ScreenChoice{edit.slot, static_cast<Screen>(found - names.begin())};
 }
 
-// A part's name may have blanks: the unit is the last word.
+// A part's name may contain spaces: the unit is the last word.
 Result<PartUnit> read_part_unit(const Edit& edit) {
   const auto blank = edit.value.rfind(' ');
   return PartUnit{edit.value, edit.value.substr(0, blank),

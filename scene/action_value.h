@@ -14,40 +14,40 @@
 
 namespace limn::scene {
 
-/// One action of a person, as text: by control marker, key, script or another program.
+/// A request for an action, as text. It comes from a control marker, a key, a script or another program.
 struct Edit {
-  std::string action;  ///< by its name in actions()
-  std::string slot;    ///< of actions on a slot; of `screen`: the one that is meant, empty: all
-  std::string value;   ///< as the action wants it; may be empty
+  std::string action;  ///< Its name in actions().
+  std::string slot;    ///< The slot of an action on a slot; for `screen` the screen's name (empty: all).
+  std::string value;   ///< The value that the action takes; may be empty.
 };
 
 /// What an action takes as its value, as text.
 enum class ArgumentKind {
   nothing,
-  text,         ///< required
-  maybe_text,   ///< or nothing
+  text,         ///< Required text.
+  maybe_text,   ///< Text or nothing.
   number,       ///< "12.5"
-  millimetres,  ///< three numbers, "1 0 -2.5"
-  pose,         ///< seven: x y z in mm and a quaternion w x y z, "120 0 -35.5 1 0 0 0"
-  on_off        ///< "on", "off", "toggle"; nothing: toggle
+  millimetres,  ///< Three numbers, "1 0 -2.5".
+  pose,         ///< Seven numbers: x y z in mm and a quaternion w x y z, "120 0 -35.5 1 0 0 0".
+  on_off        ///< "on", "off" or "toggle"; nothing means toggle.
 };
 
-/// Where a switch goes.
+/// How a switch is set.
 enum class Switch { off, on, toggle };
 
-/// What a screen is to show.
+/// A choice of what a screen shows.
 struct ScreenChoice {
-  std::string screen;           ///< of the devices file; empty: all
-  std::optional<Screen> shows;  ///< absent: the next one
+  std::string screen;           ///< A screen of the devices file; empty: all screens.
+  std::optional<Screen> shows;  ///< Absent: the content after the present one.
 };
 
-/// The unit of length of a part that was dropped in.
+/// The unit of length of a part whose file was put into a slot's folder.
 struct PartUnit {
-  std::string words;  ///< as they were written
+  std::string words;  ///< The whole text as it was written.
   std::string part, unit;
 };
 
-/// An action's value once it was read; which kind is the action's affair.
+/// An action's value after reading; the action determines its type.
 using ActionValue = std::variant<std::monostate,
                                  std::string,
                                  double,
@@ -60,8 +60,8 @@ using ActionValue = std::variant<std::monostate,
                                  MaterialOverride,
                                  std::optional<LightNumbers>>;
 
-/// The value of an edit, once for each kind. Errors name the action, what it expects and what was found.
-Result<std::monostate> read_nothing(const Edit& edit);  ///< whatever stands there
+// Readers of an edit's value, one for each type. Errors name the action, what it expects and what was found.
+Result<std::monostate> read_nothing(const Edit& edit);  ///< Ignores the value.
 Result<std::string> read_text(const Edit& edit);
 Result<double> read_millimetre(const Edit& edit);            ///< mm
 Result<Eigen::Vector3d> read_millimetres(const Edit& edit);  ///< mm

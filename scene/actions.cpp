@@ -11,7 +11,7 @@ namespace limn::scene {
 struct Change {
   const Scene& scene;
   const PosedScene& posed;      // what was shown last
-  const std::string_view name;  // of the action, for errors
+  const std::string_view name;  // the action's name, for errors
   const std::size_t slot_index;
   ShowState show_state;  // before the action, then after it
 
@@ -27,16 +27,16 @@ std::vector<std::string> variant_names(const Slot& slot) {
   return names;
 }
 
-// The element `steps` after `name`, round and round.
+// The element `steps` after `name`, cyclically.
 const std::string& stepped(const std::vector<std::string>& names, const std::string& name, int steps) {
   const auto found = std::find(names.begin(), names.end(), name);
   const int count = static_cast<int>(names.size());
-  // Before the first one stands nothing: a step on leads to it, a step back to the last.
+  // An unknown name counts as before the first: one step forward gives the first, one step back the last.
   const int at = found == names.end() ? (steps > 0 ? -1 : 0) : static_cast<int>(found - names.begin());
   return names[static_cast<std::size_t>(((at + steps) % count + count) % count)];
 }
 
-// ---- What actions do. Each takes a value that was read; on an error the change is thrown away. ----
+// ---- The actions. Each takes the value after reading; on an error the change is discarded. ----
 
 template <int k_steps>
 Status step_variant(Change* change, std::monostate) {
@@ -78,7 +78,7 @@ Status release(Change* change, std::monostate) {
 Status pair(Change* change, const std::optional<MarkerName>& marker) {
   if (!marker)
     return error(
-        "{}: expected a marker that lies still and carries nothing, found none. Lay one down for a second.",
+        "{}: expected a marker that carries nothing and lies still, found none. Lay one down for a second.",
         change->name);
   if (const Status can = check_carrier(change->scene, change->show_state, *marker, change->slot_index); !can)
     return error("{}: {}", change->name, can.message());
@@ -92,7 +92,7 @@ Status pair(Change* change, const std::optional<MarkerName>& marker) {
 
 Status unpair(Change* change, std::monostate) { return pair(change, change->slot().marker); }
 
-// The show state stays: the session keeps the unit beside the part's file.
+// The show state does not change: the session stores the unit beside the part's file.
 Status set_unit(Change* change, const PartUnit& wanted) {
   std::vector<std::string> dropped;
   for (const Variant& variant : change->slot().variants)
@@ -122,7 +122,7 @@ Status save_look(Change* change, const std::string& name) {
   Look look;
   look.name = name.empty() ? unused_look_name(show_state) : name;
   if (!is_look_name(look.name))
-    return error("{}: expected a name of letters, digits, blanks, '-', '_' and '.', found '{}'.",
+    return error("{}: expected a name of letters, digits, spaces, '-', '_' and '.', found '{}'.",
                  change->name, look.name);
   const Pose prototype_from_world =
       posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
@@ -159,8 +159,8 @@ Status step_look(Change* change, std::monostate) {
 Status flip(Change* change, const std::string& name) {
   const ShowState& show_state = change->show_state;
   if (name.empty() && show_state.other_look.empty())
-    return error("{}: expected two looks shown before, found {}. Save or restore another.", change->name,
-                 show_state.look.empty() ? "none" : "one");
+    return error("{}: expected two looks shown before, found {}. Save or restore another look first.",
+                 change->name, show_state.look.empty() ? "none" : "one");
   return restore_look(change, std::string(name.empty() ? show_state.other_look : name));
 }
 
@@ -180,17 +180,16 @@ Status delete_look(Change* change, const std::string& name) {
 
 Status undelete_look(Change* change, std::monostate) {
   ShowState& show_state = change->show_state;
-  if (!show_state.deleted_look)
-    return error("{}: expected a look that was deleted, found none.", change->name);
+  if (!show_state.deleted_look) return error("{}: expected a deleted look, found none.", change->name);
   if (find_look(show_state, show_state.deleted_look->name))
-    return error("{}: expected no look of that name, found another '{}'. Delete it first.", change->name,
+    return error("{}: expected no other look of that name, found '{}'. Delete it first.", change->name,
                  show_state.deleted_look->name);
   show_state.looks.push_back(std::move(*show_state.deleted_look));
   show_state.deleted_look.reset();
   return {};
 }
 
-// The show state stays: the session's devices do it.
+// The show state does not change: the session measures its devices.
 Status repair(Change* change, std::monostate) {
   if (!change->show_state.blackout) return {};
   return error("{}: expected light, found blackout. End the blackout first.", change->name);
@@ -206,7 +205,7 @@ Status set_light(Change* change, const std::optional<LightNumbers>& numbers) {
   return {};
 }
 
-// A switch of the staging.
+// Sets a flag of the show state.
 template <bool ShowState::*k_flag>
 Status set_flag(Change* change, Switch wanted) {
   bool& flag = change->show_state.*k_flag;
@@ -217,8 +216,9 @@ Status set_flag(Change* change, Switch wanted) {
 Status set_split(Change* change, Switch wanted) {
   LIMN_TRY_STATUS(set_flag<&ShowState::split>(change, wanted));
   if (change->show_state.split && change->show_state.other_look.empty())
-    return error("{}: expected a look shown before the present one, found none. Save or restore two.",
-                 change->name);
+    return error(
+        "{}: expected a look shown before the present one, found none. Save or restore two looks first.",
+        change->name);
   return {};
 }
 
@@ -235,8 +235,8 @@ Status set_screen(Change* change, const ScreenChoice& choice) {
   if (!is_all && output == show_state.screens.end()) {
     std::vector<std::string> outputs;
     for (const Output& known : show_state.screens) outputs.push_back(known.name);
-    return error("{}: expected a screen of the devices file ({}), or none for all, found '{}'.", change->name,
-                 listed(outputs), choice.screen);
+    return error("{}: expected a screen of the devices file ({}), or no name for all screens, found '{}'.",
+                 change->name, listed(outputs), choice.screen);
   }
   const auto before = static_cast<std::size_t>(is_all ? show_state.screen : output->shows);
   const auto shows = choice.shows.value_or(static_cast<Screen>((before + 1) % screen_names().size()));
@@ -270,7 +270,7 @@ Status apply_with(Change* change, const ActionValue& value) {
   return k_apply(change, std::get<ValueOf<k_read>>(value));
 }
 
-// Reads the value with the one and does the action with the other, which takes just that.
+// The functions of an action: k_read reads its value, k_apply takes exactly that type.
 template <auto k_read, auto k_apply>
 constexpr Action::Functions k_by = {&read_with<k_read>, &apply_with<k_read, k_apply>};
 
@@ -282,7 +282,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "next_variant",
      .role = work,
      .of_slot = true,
-     .what = "the slot's next variant",
+     .what = "shows the slot's next variant",
      .opposite = ActionId::previous_variant,
      .keys = {Key::right, Key::page_down, Key{'N'}},
      .functions = k_by<read_nothing, step_variant<1>>},
@@ -290,7 +290,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .name = "previous_variant",
      .role = work,
      .of_slot = true,
-     .what = "the slot's previous variant",
+     .what = "shows the slot's previous variant",
      .opposite = ActionId::next_variant,
      .keys = {Key::left, Key::page_up, Key{'P'}},
      .functions = k_by<read_nothing, step_variant<-1>>},
@@ -300,7 +300,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .of_slot = true,
      .argument_kind = text,
      .value = "a variant",
-     .what = "a variant by name",
+     .what = "shows the variant of this name",
      .functions = k_by<read_text, choose_variant>},
     {.id = ActionId::nudge,
      .name = "nudge",
@@ -316,13 +316,13 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .of_slot = true,
      .argument_kind = ArgumentKind::pose,
      .value = "x, y, z in mm; quaternion w, x, y, z",
-     .what = "puts the part there on the prototype, until its marker is moved",
+     .what = "puts the part at this pose on the prototype until its marker is moved",
      .functions = k_by<read_place, place>},
     {.id = ActionId::release,
      .name = "release",
      .role = work,
      .of_slot = true,
-     .what = "the part follows its marker again, without nudges",
+     .what = "lets the part follow its marker again, without nudges",
      .keys = {Key{'R'}},
      .functions = k_by<read_nothing, release>},
     {.id = ActionId::pair,
@@ -331,14 +331,14 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .of_slot = true,
      .argument_kind = maybe_text,
      .value = "a marker; empty: the one that glows",
-     .what = "the part is carried by that marker from now on",
+     .what = "lets this marker carry the part from now on",
      .keys = {Key{'A'}},
      .functions = k_by<read_marker, pair>},
     {.id = ActionId::unpair,
      .name = "unpair",
      .role = operate,
      .of_slot = true,
-     .what = "the scene's own marker carries the part again",
+     .what = "lets the scene's own marker carry the part again",
      .functions = k_by<read_nothing, unpair>},
     {.id = ActionId::units,
      .name = "units",
@@ -346,7 +346,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .of_slot = true,
      .argument_kind = text,
      .value = "a variant and m, cm, mm, in or ft",
-     .what = "the unit of a part that was dropped in",
+     .what = "sets the unit of a part whose file was put into the slot's folder",
      .functions = k_by<read_part_unit, set_unit>},
     {.id = ActionId::material,
      .name = "material",
@@ -354,14 +354,14 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .of_slot = true,
      .argument_kind = maybe_text,
      .value = "a colour, metalness, roughness, - for the file's: #c02818 0 0.4",
-     .what = "the part's material, of every variant; empty: as its file says",
+     .what = "sets the material of all of the part's variants; empty: the file's materials",
      .functions = k_by<read_material, set_material>},
     {.id = ActionId::save_look,
      .name = "save_look",
      .role = work,
      .argument_kind = maybe_text,
      .value = "a name; empty: look-01 and so on",
-     .what = "keeps variants, places, materials and light, as JSON and PNG",
+     .what = "saves variants, poses, materials and light, as JSON and PNG",
      .keys = {Key{'S'}},
      .functions = k_by<read_text, save_look>},
     {.id = ActionId::restore_look,
@@ -369,19 +369,19 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = text,
      .value = "a look",
-     .what = "shows a look until its markers are moved",
+     .what = "shows a look; each part stays until its marker is moved",
      .functions = k_by<read_text, restore_look>},
     {.id = ActionId::next_look,
      .name = "next_look",
      .role = work,
-     .what = "the look after the one last shown",
+     .what = "shows the look after the one last shown",
      .opposite = ActionId::previous_look,
      .keys = {Key{'L'}},
      .functions = k_by<read_nothing, step_look<1>>},
     {.id = ActionId::previous_look,
      .name = "previous_look",
      .role = work,
-     .what = "the look before it",
+     .what = "shows the look before the one last shown",
      .opposite = ActionId::next_look,
      .keys = {Key{'K'}},
      .functions = k_by<read_nothing, step_look<-1>>},
@@ -390,7 +390,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = maybe_text,
      .value = "a look; empty: the one shown before",
-     .what = "shows the other of two looks",
+     .what = "switches to the other of two looks",
      .keys = {Key{'V'}},
      .functions = k_by<read_text, flip>},
     {.id = ActionId::split,
@@ -398,7 +398,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = on_off,
      .value = "on, off or toggle",
-     .what = "left of a line the look shown before",
+     .what = "shows the previous look on the left of a line, the present one on the right",
      .keys = {Key{'X'}},
      .functions = k_by<read_switch, set_split>},
     {.id = ActionId::split_at,
@@ -406,39 +406,39 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = number,
      .value = "mm to the right of the prototype's middle",
-     .what = "where that line is",
+     .what = "moves the line of split",
      .functions = k_by<read_millimetre, move_split>},
     {.id = ActionId::delete_look,
      .name = "delete_look",
      .role = work,
      .argument_kind = text,
      .value = "a look",
-     .what = "forgets a look",
+     .what = "deletes a look",
      .functions = k_by<read_text, delete_look>},
     {.id = ActionId::undelete_look,
      .name = "undelete_look",
      .role = work,
-     .what = "brings back the look that was last deleted",
+     .what = "brings back the last deleted look",
      .functions = k_by<read_nothing, undelete_look>},
     {.id = ActionId::repair,
      .name = "repair",
      .role = operate,
      .what =
-         "patterns on the prototype for some 15 s: the session goes on with a rig that knows what was nudged",
+         "measures a moved device with patterns on the prototype (about 15 s) and corrects the session's rig",
      .functions = k_by<read_nothing, repair>},
     {.id = ActionId::light,
      .name = "light",
      .role = work,
      .argument_kind = maybe_text,
      .value = "a lamp's degrees right and up, its strength, soft light above and below: 30 45 0.6 0.3 0.1",
-     .what = "the light that parts are shaded by, as seen from camera 0; empty: the scene's own",
+     .what = "sets the light that parts are shaded by, as seen from camera 0; empty: the scene's own",
      .functions = k_by<read_light, set_light>},
     {.id = ActionId::blackout,
      .name = "blackout",
      .role = work,
      .argument_kind = on_off,
      .value = "on, off or toggle",
-     .what = "bare model: no light",
+     .what = "switches all projected light off: the bare prototype",
      .keys = {Key{'B'}, Key{'.'}},
      .functions = k_by<read_switch, set_flag<&ShowState::blackout>>},
     {.id = ActionId::freeze,
@@ -446,7 +446,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = on_off,
      .value = "on, off or toggle",
-     .what = "what is shown stays",
+     .what = "freezes what is shown",
      .keys = {Key{'F'}},
      .functions = k_by<read_switch, set_flag<&ShowState::frozen>>},
     {.id = ActionId::grid,
@@ -454,7 +454,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = on_off,
      .value = "on, off or toggle",
-     .what = "lines on the prototype, every 10 mm",
+     .what = "draws lines on the prototype, every 10 mm",
      .keys = {Key{'G'}},
      .functions = k_by<read_switch, set_flag<&ShowState::grid>>},
     {.id = ActionId::marker_states,
@@ -462,7 +462,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = operate,
      .argument_kind = on_off,
      .value = "on, off or toggle",
-     .what = "rings around markers: green seen, amber carried on",
+     .what = "draws rings around markers: green is measured, amber is extrapolated",
      .keys = {Key{'M'}},
      .functions = k_by<read_switch, set_flag<&ShowState::marker_states>>},
     {.id = ActionId::screen,
@@ -471,7 +471,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .argument_kind = maybe_text,
      .value = "rest, full, camera, view, stereo, off or next",
      .of = "a screen; left out: all",
-     .what = "what screens show, or the one that is named",
+     .what = "sets what a screen shows, or all screens",
      .keys = {Key{'O'}},
      .value_of_keys = "next",
      .functions = k_by<read_screen, set_screen>},
@@ -480,7 +480,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = maybe_text,
      .value = "a guest's name; empty: the scene's own viewer",
-     .what = "whose eye view parts are drawn for: a guest's tablet while its window sees markers",
+     .what = "draws view parts for this guest's tablet while its camera sees markers",
      .functions = k_by<read_text, set_viewer>},
 }};
 

@@ -14,8 +14,8 @@
 
 namespace limn::scene {
 
-/// Everything that people and programs can do in a session. Each has its row in actions.cpp, in this order;
-/// one without a row does not compile.
+/// Everything that people and programs can do in a session. Each action has a row in the table in
+/// actions.cpp, in this order; a missing row is a compiler error.
 enum class ActionId {
   next_variant,
   previous_variant,
@@ -44,70 +44,70 @@ enum class ActionId {
   marker_states,
   screen,
   viewer,
-  count  ///< of the actions; none itself
+  count  ///< The number of actions; not an action.
 };
 constexpr auto k_action_count = static_cast<std::size_t>(ActionId::count);
 
-/// What somebody of the remote may do; each may do what those before it may (docs/remote.md).
+/// What a guest of the remote may do. Each role includes the roles before it (docs/remote.md).
 enum class Role { look, work, operate };
 const std::string& name_of(Role role);  ///< "look", "work", "operate"
 
-/// A key of a keyboard, a presentation clicker or a pedal, by GLFW's codes: letters and marks are themselves,
-/// capital ('N').
+/// A key of a keyboard, a presentation clicker or a pedal, as a GLFW code. The codes of letters and
+/// punctuation are their characters, letters in upper case ('N').
 enum class Key : int { none = 0, tab = 258, right = 262, left = 263, page_up = 266, page_down = 267 };
 
-/// What an action is done to (actions.cpp).
+/// What an action works on (actions.cpp).
 struct Change;
 
-/// A row of the table of actions: all that the rest of Limn knows of an action.
+/// A row of the table of actions: everything that the rest of Limn knows about an action.
 struct Action {
-  /// How it is done. `apply` takes what `read` has made of the text.
+  /// How the action is done. `read` parses the text; `apply` takes the result.
   struct Functions {
     Result<ActionValue> (*read)(const Edit&);
     Status (*apply)(Change*, const ActionValue&);
   };
   ActionId id;
-  std::string_view name;  ///< by which files, messages and OSC call it
-  Role role;              ///< the least that may do it
+  std::string_view name;  ///< The action's name in files, messages and OSC.
+  Role role;              ///< The lowest role that may do it.
   bool of_slot = false;
   ArgumentKind argument_kind = ArgumentKind::nothing;
-  std::string_view value = {};            ///< what Edit::value says, in words; empty: nothing
-  std::string_view of = {};               ///< what Edit::slot may name when it is on no slot; empty: nothing
-  std::string_view what;                  ///< what it does, a sentence for people
-  std::optional<ActionId> opposite = {};  ///< what a control marker does that is turned backwards
-  std::array<Key, 3> keys = {};           ///< the operator's, which do it to the chosen slot
-  std::string_view value_of_keys = {};    ///< what they give as the value
+  std::string_view value = {};  ///< Description of Edit::value for people; empty: the action takes no value.
+  std::string_view of = {};     ///< Meaning of Edit::slot when the action is not on a slot; empty: not used.
+  std::string_view what;        ///< Description of the action for people.
+  std::optional<ActionId> opposite = {};  ///< The action of a control marker that is turned backwards.
+  std::array<Key, 3> keys = {};           ///< The operator's keys for the action, on the chosen slot.
+  std::string_view value_of_keys = {};    ///< The value that these keys send.
   Functions functions;
 };
 
 /// The table, in the order of ActionId.
 std::span<const Action, k_action_count> actions();
 const Action& action_of(ActionId id);
-/// The action of that name; nullptr: there is none.
+/// The action of that name; null when there is none.
 const Action* find_action(std::string_view name);
-/// "next_variant, previous_variant, …": for errors.
+/// The names "next_variant, previous_variant, …" for error messages.
 std::string action_names();
 
-/// An action as it is told and recorded.
+/// An edit with the action's name, as it is sent and recorded.
 Edit make_edit(ActionId action, std::string slot = {}, std::string value = {});
 
-/// An edit that was read: its names are known, its value has a type.
+/// An edit after reading: its names are resolved, its value has a type.
 struct Command {
   ActionId action;
-  std::size_t slot = 0;  ///< of actions on a slot: which of the scene's
+  std::size_t slot = 0;  ///< Index of the slot in the scene, for an action on a slot.
   ActionValue value;
 };
 
-/// Error: an unknown action or slot, or a value that is not what the action takes.
+/// Reads an edit. Error: an unknown action or slot, or a value that the action does not take.
 Result<Command> command_of(const Scene& scene, const Edit& edit);
 
-/// The show state after a command. `posed` is what was shown last: looks are saved from it. Error, and
-/// nothing has changed: a variant, look, marker or screen that is not there, or what cannot be done now.
+/// The show state after a command. `posed` is what was shown last: looks are saved from it. Error: an unknown
+/// variant, look, marker or screen, or an action that is impossible at present.
 Result<ShowState> apply_edit(const Scene& scene,
                              const ShowState& show_state,
                              const PosedScene& posed,
                              const Command& command);
-/// The same from text; errors of command_of(), too.
+/// As above, from text; errors of command_of() are possible, too.
 Result<ShowState> apply_edit(const Scene& scene,
                              const ShowState& show_state,
                              const PosedScene& posed,

@@ -45,7 +45,7 @@ std::optional<LightNumbers> room_light_numbers(const RoomLight& light, const Eig
   if (light.lamps.size() != 1 || !is_white(light.lamps[0].strength_rgb) || !is_white(light.above_rgb) ||
       !is_white(light.below_rgb))
     return std::nullopt;
-  // As a lamp to the front and one 90 degrees to the right of it stand.
+  // The directions of a lamp in front and of one 90 degrees to the right of it.
   const auto lamp_at = [&](const LightNumbers& numbers) {
     return parse_room_light(numbers, light.d_up_world, d_front_world).lamps[0].d_world;
   };

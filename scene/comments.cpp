@@ -10,7 +10,7 @@
 namespace limn::scene {
 namespace {
 
-// UTF-8 without control characters but line feeds.
+// Whether the text is UTF-8 without control characters other than line feeds.
 bool is_text(const std::string& text) {
   const auto is_control = [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; };
   if (std::any_of(text.begin(), text.end(), is_control)) return false;
@@ -27,7 +27,7 @@ Status check(const Comment& comment) {
       return error("comment: expected names of at most {} bytes of text, found '{}'.", k_longest_name,
                    is_text(*name) ? *name : "?");
   if (comment.text.empty() || comment.text.size() > k_longest_comment || !is_text(comment.text))
-    return error("comment: expected a text of 1 to {} bytes without control characters, found {} bytes.",
+    return error("comment: expected text of 1 to {} bytes without control characters, found {} bytes.",
                  k_longest_comment, comment.text.size());
   return {};
 }
@@ -62,7 +62,7 @@ Result<std::vector<Comment>> load_comments(const std::filesystem::path& path) {
 
 Status save_comments(const std::filesystem::path& path, const std::vector<Comment>& comments) {
   if (comments.size() > k_most_comments)
-    return error("{}: expected at most {} comments, found {}. Keep the file elsewhere and begin another.",
+    return error("{}: expected at most {} comments, found {}. Move the file elsewhere to start a new one.",
                  path.string(), k_most_comments, comments.size());
   nlohmann::ordered_json all = nlohmann::ordered_json::array();
   for (const Comment& comment : comments)

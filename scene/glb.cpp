@@ -16,7 +16,7 @@ constexpr int k_array_buffer = 34962, k_element_array_buffer = 34963;
 template <class T>
 void append(std::string& bytes, T value) {
   char raw[sizeof(T)];
-  std::memcpy(raw, &value, sizeof(T));  // glTF is little endian, as every machine that this runs on
+  std::memcpy(raw, &value, sizeof(T));  // glTF is little endian, like every machine that Limn supports
   bytes.append(raw, sizeof(T));
 }
 
@@ -27,15 +27,15 @@ std::string chunk(const char* kind, std::string data, char filler) {
   return bytes.append(kind, 4) + data;
 }
 
-// The binary chunk and the JSON that describes it, growing together.
+// Builds the binary chunk together with the JSON that describes it.
 struct Document {
   std::string bytes;
   ordered_json views = ordered_json::array(), accessors = ordered_json::array(),
                images = ordered_json::array();
   ordered_json meshes = ordered_json::array(), nodes = ordered_json::array();
   ordered_json materials = ordered_json::array();
-  std::map<const Mesh*, int> numbers = {};                   // of meshes that are in already
-  std::map<const std::uint8_t*, std::size_t> textures = {};  // their number by their pixels
+  std::map<const Mesh*, int> numbers = {};                   // numbers of the meshes written so far
+  std::map<const std::uint8_t*, std::size_t> textures = {};  // texture numbers by pixel address
   bool has_textures = true, is_unlit = false;
 
   std::size_t add_view(const std::string& data) {
@@ -85,7 +85,7 @@ struct Document {
         {{"componentType", small ? k_unsigned_short : k_unsigned_int}, {"count", count}, {"type", "SCALAR"}});
   }
 
-  // The index of a texture; an image that is in already is not put in again.
+  // The index of a texture; an image is written only once.
   ordered_json add_texture(const cv::Mat& image) {
     const auto [known, is_new] = textures.try_emplace(image.data, images.size());
     if (is_new) {

@@ -8,19 +8,20 @@
 
 namespace limn::scene {
 
-/// A mesh in its place.
+/// A mesh with its pose.
 struct GlbNode {
-  std::string name;  ///< of its node
+  std::string name;  ///< The node's name in the file.
   const Mesh* mesh = nullptr;
   Pose assembly_from_mesh;
 };
 
-/// The bytes of a binary glTF 2.0 file, metres: a node for each mesh with its pose, one primitive per
-/// material; positions, normals, uv and tangents when present, base colours, metalness, roughness, textures
-/// and maps of the surface as PNG inside. The same meshes give the same bytes. Needs at least one mesh.
+/// The bytes of a binary glTF 2.0 file in metres. It has a node for each mesh with its pose and one primitive
+/// per material, with positions, normals, uv and tangents (when present), base colours, metalness, roughness,
+/// and textures and surface maps as PNG. The same meshes give the same bytes. There must be at least one
+/// mesh.
 std::string encode_glb(std::span<const GlbNode> placed);
 
-/// The same of one mesh in its own frame, without its textures.
+/// As above, for one mesh in its own frame and without its textures.
 std::string encode_glb(const Mesh& mesh);
 
 }  // namespace limn::scene

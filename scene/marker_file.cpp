@@ -29,7 +29,7 @@ Result<std::vector<BodyMarker>> load_marker_file(const std::filesystem::path& pa
     markers.push_back({*name, 1e-3 * node.at("size_mm").positive(),
                        node.at(is_body ? "body_from_marker" : "prototype_from_marker").pose()});
   }
-  if (markers.empty()) root.at("markers").problem("expected a marker at least, found none.");
+  if (markers.empty()) root.at("markers").problem("expected at least one marker, found none.");
   LIMN_TRY_STATUS(config.status());
   return markers;
 }

@@ -6,21 +6,23 @@
 
 namespace limn::scene {
 
-/// An image in a mesh's uv, 8-bit BGR, whose v counts up from its bottom row, as in OBJ; beyond 0 … 1 it
-/// repeats.
+/// An 8-bit BGR image in a mesh's uv coordinates. v counts up from its bottom row, as in OBJ; outside 0 … 1
+/// the image repeats.
 struct Texture {
-  cv::Mat image;     ///< empty: none
-  std::string file;  ///< that it came from, for messages
+  cv::Mat image;     ///< Empty: no texture.
+  std::string file;  ///< The file it came from, for messages.
 };
 
-/// What glTF's textures say of a surface beyond its colour. All but `emission` (sRGB) are numbers, 0 … 255
-/// for 0 … 1.
+/// A surface's glTF textures other than its colour. Except for `emission` (sRGB), the levels 0 … 255 stand
+/// for numbers from 0 to 1.
 struct SurfaceMaps {
-  Texture metallic_roughness;  ///< blue and green multiply metalness and roughness
-  Texture normals;         ///< x, y, z (red, green, blue) of 2 c - 1: along tangent, bitangent (up), normal
-  Texture occlusion;       ///< red: share of soft light that arrives
-  Texture emission;        ///< multiplies Material::emitted
-  float normal_scale = 1;  ///< multiplies x and y of `normals`
+  Texture metallic_roughness;  ///< Blue multiplies metalness, green multiplies roughness.
+  /// Normals as 2 c - 1; red, green and blue are the parts along the tangent, the bitangent (up) and the
+  /// normal.
+  Texture normals;
+  Texture occlusion;       ///< Red: share of the soft light that arrives.
+  Texture emission;        ///< Multiplies Material::emitted.
+  float normal_scale = 1;  ///< Multiplies x and y of `normals`.
   float occlusion_strength = 1;
 
   bool is_none() const {
@@ -29,18 +31,18 @@ struct SurfaceMaps {
   }
 };
 
-/// Surface of one piece of a mesh. Colours are linear light; the texture is sRGB, 8-bit BGR, or BGRA where
-/// pieces are cut out, and multiplies base_colour. v of uv counts up from the image's bottom row, as in
+/// The surface of one piece of a mesh. Colours are linear light. The texture is sRGB, 8-bit BGR (BGRA where
+/// parts of it are cut out), and multiplies base_colour. v of uv counts up from the image's bottom row, as in
 /// OBJ.
 struct Material {
   Eigen::Vector3f base_colour = {0.8f, 0.8f, 0.8f};
-  bool unlit = false;  ///< KHR_materials_unlit: shown as its base colour
+  bool unlit = false;  ///< KHR_materials_unlit: shown in its base colour without shading.
   float metallic = 0,
-        roughness = 1;            ///< glTF's; not metallic and of roughness 1, without a map: diffuse alone
-  cv::Mat texture;                ///< empty: none
-  std::string texture_file = {};  ///< that it came from, for messages
-  float cut_below = 0;            ///< where the texture's alpha (0 to 1) is less there is nothing
-  Eigen::Vector3f emitted = Eigen::Vector3f::Zero();  ///< its own light, in whatever light it stands
+        roughness = 1;            ///< As in glTF. Metalness 0 and roughness 1 without a map: diffuse only.
+  cv::Mat texture;                ///< Empty: no texture.
+  std::string texture_file = {};  ///< The file it came from, for messages.
+  float cut_below = 0;            ///< The surface has holes where the texture's alpha (0 to 1) is below this.
+  Eigen::Vector3f emitted = Eigen::Vector3f::Zero();  ///< Light that the surface emits itself.
   SurfaceMaps maps = {};
 };
 

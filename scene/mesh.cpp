@@ -22,10 +22,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Faces that meet at a sharper angle keep an edge between them when normals are made.
-constexpr float k_crease_cos = 0.7660444f;  // 40 degrees: a bevel stays crisp, a coarse curve is smoothed
+// When normals are computed, faces whose normals differ by more keep a sharp edge between them.
+constexpr float k_crease_cos = 0.7660444f;  // 40 degrees: a bevel stays sharp, a coarse curve is smoothed
 
-// What a vertex is while a mesh is read; joined by equality of its bytes.
+// A vertex while a mesh is read. Vertices with equal bytes are merged.
 struct Corner {
   Eigen::Vector3f position;
   Eigen::Vector3f normal;
@@ -33,10 +33,10 @@ struct Corner {
 };
 static_assert(sizeof(Corner) == 8 * sizeof(float));
 
-// A mesh as it comes from the file: three corners a triangle, nothing shared.
+// A mesh as it comes from the file: three corners per triangle, no shared vertices.
 struct Soup {
   std::vector<Corner> corners;
-  std::vector<Eigen::Vector4f> tangents;  // of the corners, as in Mesh; empty: the file has none
+  std::vector<Eigen::Vector4f> tangents;  // per corner, as in Mesh; empty: the file has none
   std::vector<std::uint16_t> triangle_materials;
   bool has_uvs = false;
   bool needs_normals = false;
@@ -56,7 +56,7 @@ Eigen::Matrix4f to_eigen(const aiMatrix4x4& m) {
 
 Eigen::Vector3f to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 
-// A vertex's tangent in the file's frame; `turn` may mirror, which turns its handedness around.
+// A vertex's tangent in the file's frame. If `turn` mirrors, the handedness changes.
 Eigen::Vector4f tangent_of(const aiMesh& mesh, unsigned i, const Eigen::Matrix3f& turn) {
   const Eigen::Vector3f t = to_eigen(mesh.mTangents[i]), b = to_eigen(mesh.mBitangents[i]);
   const float hand = to_eigen(mesh.mNormals[i]).cross(t).dot(b) * turn.determinant();
@@ -64,7 +64,7 @@ Eigen::Vector4f tangent_of(const aiMesh& mesh, unsigned i, const Eigen::Matrix3f
   return {turned.x(), turned.y(), turned.z(), hand < 0 ? -1.F : 1.F};
 }
 
-// Whether a texture's axes go along its coordinates', as a file's tangents take it.
+// Whether the texture's axes are parallel to its coordinates' axes, as a file's tangents assume.
 bool is_upright(const TexturePlace& place) {
   const Eigen::Matrix2f m = place.moved.linear();
   return m(0, 0) > 0 && m(1, 1) > 0 && std::max(std::abs(m(0, 1)), std::abs(m(1, 0))) < 1e-6F;
@@ -134,7 +134,7 @@ float angle_at(const Soup& soup, std::size_t corner) {
   return std::acos(std::clamp(a.dot(b), -1.f, 1.f));
 }
 
-// Index of the distinct position of every corner.
+// For each corner, the index of its distinct position.
 std::vector<unsigned> joined_positions(const Soup& soup, std::size_t* count) {
   std::vector<Eigen::Vector3f> positions;
   positions.reserve(soup.corners.size());
@@ -145,8 +145,8 @@ std::vector<unsigned> joined_positions(const Soup& soup, std::size_t* count) {
   return remap;
 }
 
-// Normals from the faces around each corner, weighted by their angle there; edges sharper than the crease
-// stay.
+// Computes missing normals from the faces around each corner, weighted by their angle there. Edges sharper
+// than the crease angle are kept.
 void make_normals(Soup* soup) {
   std::size_t count = 0;
   const std::vector<unsigned> position_of = joined_positions(*soup, &count);
@@ -160,7 +160,7 @@ void make_normals(Soup* soup) {
   std::vector<Eigen::Vector3f> d_face(soup->triangle_materials.size());
   for (std::size_t t = 0; t < d_face.size(); ++t) d_face[t] = face_normal(*soup, t).normalized();
   for (unsigned c = 0; c < position_of.size(); ++c) {
-    if (soup->corners[c].normal.squaredNorm() > 0.25f) continue;  // the file has one
+    if (soup->corners[c].normal.squaredNorm() > 0.25f) continue;  // the file gave a normal
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     for (unsigned k = begin[position_of[c]]; k < begin[position_of[c] + 1]; ++k) {
       const unsigned other = around[k];
@@ -171,7 +171,8 @@ void make_normals(Soup* soup) {
   }
 }
 
-// `corner_tangents`: of the corners of the triangles that are left.
+// Merges equal vertices and drops triangles without area. `corner_tangents` gets the remaining corners'
+// tangents.
 Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
   const std::size_t corner_count = soup.corners.size();
   std::vector<unsigned> remap(corner_count);
@@ -196,7 +197,7 @@ Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
   return mesh;
 }
 
-// Of a mesh without uvs. What glows in places does not glow.
+// Removes the texture maps of a mesh without uvs. A material with an emission map then emits nothing.
 void leave_out_maps(const fs::path& path, Mesh* mesh) {
   bool has_textures = false;
   for (Material& material : mesh->materials) {
@@ -206,8 +207,8 @@ void leave_out_maps(const fs::path& path, Mesh* mesh) {
   }
   if (!has_textures) return;
   log_warning(
-      "{}: expected texture coordinates, for its materials have textures, found none; it is shown without "
-      "them. Export the mesh with its coordinates.",
+      "{}: expected texture coordinates because its materials have textures, found none. It is shown without "
+      "textures. Export the mesh with texture coordinates.",
       path.string());
 }
 
@@ -227,7 +228,8 @@ Error no_triangles(const fs::path& path) {
   return error("{}: expected triangles, found none. Export the mesh with its faces.", path.string());
 }
 
-// Assimp's STL reader gives each triangle its own normal; it goes, so that curved surfaces are smooth.
+// Assimp's STL reader gives each triangle its own normal. These are dropped, so that curved surfaces are
+// smooth.
 void drop_normals(Soup* soup) {
   for (Corner& corner : soup->corners) corner.normal.setZero();
   soup->needs_normals = true;
@@ -243,8 +245,8 @@ Status known_format(const fs::path& path) {
       path.string(), format);
 }
 
-// What assimp warns of while this lives: it drops triangles with a warning and calls the rest a success. One
-// thread at a time, for its logger is global.
+// Collects assimp's warnings while it exists: assimp drops bad triangles with only a warning. It must be used
+// by one thread at a time, because assimp's logger is global.
 class Complaints {
  public:
   Complaints() {
@@ -287,7 +289,7 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
   if (!metres) return error("{}: {}", path.string(), metres.message());
   LIMN_TRY_STATUS(known_format(path));
   if (std::error_code code; !fs::is_regular_file(path, code)) {
-    return error("{}: expected a mesh file, found none. Check the name.", path.string());
+    return error("{}: expected a mesh file, found no file. Check the name.", path.string());
   }
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
@@ -296,16 +298,17 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
       path.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
   if (complaints.text().find("out-of-range indices") != std::string::npos) {
     return error(
-        "{}: expected triangles of the mesh's own vertices, found indices beyond them. Export it again.",
+        "{}: expected triangles of the mesh's own vertices, found indices beyond their number. Export it "
+        "again.",
         path.string());
   }
   const std::string problem = importer.GetErrorString();
   const bool without_faces =
       problem.find("no faces") != std::string::npos ||
-      problem.find("No meshes remaining") != std::string::npos;  // points and lines only
+      problem.find("No meshes remaining") != std::string::npos;  // the file has only points and lines
   if (!scene && without_faces) return no_triangles(path);
   if (!scene) {
-    return error("{}: expected a whole {} mesh, found one that cannot be read ({}). Export it again.",
+    return error("{}: expected a complete {} mesh, found one that cannot be read ({}). Export it again.",
                  path.string(), extension(path).substr(1), problem);
   }
   if (!scene->mRootNode) return no_triangles(path);

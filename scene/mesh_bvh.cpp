@@ -12,8 +12,8 @@
 namespace limn::scene {
 namespace {
 
-// Barycentric coordinates of the point of triangle abc nearest to p, by the region of the triangle that p
-// faces: a corner, an edge or the inside (Ericson, Real-Time Collision Detection, 5.1.5).
+// Barycentric coordinates of the point of triangle abc nearest to p. The case depends on which feature is
+// nearest: a corner, an edge or the inside (Ericson, Real-Time Collision Detection, 5.1.5).
 Eigen::Vector3d nearest_in_triangle(const Eigen::Vector3d& a,
                                     const Eigen::Vector3d& b,
                                     const Eigen::Vector3d& c,
@@ -45,7 +45,8 @@ Eigen::Vector3d nearest_in_triangle(const Eigen::Vector3d& a,
   return Eigen::Vector3d(beyond_bc, beyond_ac, beyond_ab) / (beyond_ab + beyond_ac + beyond_bc);
 }
 
-constexpr std::uint32_t k_leaf = 4;  // triangles; fewer make more boxes than they save looking
+constexpr std::uint32_t k_leaf =
+    4;  // triangles per leaf; fewer cost more in boxes than they save in triangle tests
 
 Eigen::Vector3d corner_of(const Mesh& mesh, std::size_t triangle, std::size_t corner) {
   return mesh.positions[mesh.triangles[triangle][corner]].cast<double>();
@@ -73,8 +74,8 @@ MeshPoint most_likely_on(const Mesh& mesh, const Eigen::Vector3d& p, const Eigen
   LIMN_CHECK(!mesh.triangles.empty());
   const Eigen::LLT<Eigen::Matrix3d> root(covariance);
   LIMN_CHECK(root.info() == Eigen::Success);
-  // In whitened coordinates with p as origin the likeliest is the nearest, and barycentric coordinates are
-  // the same.
+  // In whitened coordinates with p as the origin the most likely point is the nearest one, and barycentric
+  // coordinates do not change.
   const Eigen::Matrix3d whitened = root.matrixL().solve(Eigen::Matrix3d::Identity());
   std::vector<Eigen::Vector3d> places;
   places.reserve(mesh.positions.size());
@@ -112,7 +113,7 @@ MeshBvh::MeshBvh(const Mesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) 
   build(0, static_cast<std::uint32_t>(order_.size()));
 }
 
-// Halves by the median of the centres along the longest side; the first child follows its parent.
+// Splits at the median of the centres along the longest side; the first child directly follows its parent.
 std::uint32_t MeshBvh::build(std::uint32_t first, std::uint32_t count) {
   const auto at = static_cast<std::uint32_t>(boxes_.size());
   Box box;
@@ -131,7 +132,7 @@ std::uint32_t MeshBvh::build(std::uint32_t first, std::uint32_t count) {
   box.d_mean.normalize();
   for (std::uint32_t i = first; i < first + count; ++i)
     box.cos_widest = std::min(box.cos_widest, box.d_mean.dot(d_faces_[order_[i]]));
-  box.cos_widest = std::max(-1.f, box.cos_widest - 1e-5f);  // rounding must not exclude
+  box.cos_widest = std::max(-1.f, box.cos_widest - 1e-5f);  // margin, so that rounding excludes no triangle
   box.sin_widest = std::sqrt(1 - box.cos_widest * box.cos_widest);
   boxes_.push_back(box);
   if (count <= k_leaf) return at;
@@ -156,14 +157,14 @@ std::optional<MeshPoint> MeshBvh::nearest(const Eigen::Vector3d& p,
   std::optional<MeshPoint> found;
   Eigen::Vector3d weights = {1, 0, 0};
   const double min_sin = std::sqrt(std::max(0.0, 1 - min_cos * min_cos));
-  std::uint32_t stack[64];  // halving: as deep as the logarithm of the triangles' number
+  std::uint32_t stack[64];  // enough: the tree's depth is the logarithm of the number of triangles
   int depth = 0;
   stack[depth++] = 0;
   while (depth > 0) {
     const std::uint32_t at = stack[--depth];
     const Box& box = boxes_[at];
     if (squared_distance(box.low, box.high, p) > best) continue;
-    if (d_facing) {  // by the sum of two angles; one beyond 180 degrees excludes nothing
+    if (d_facing) {  // compares the sum of two angles; if it is beyond 180 degrees, nothing is excluded
       const double cos_a = box.cos_widest, sin_a = box.sin_widest;
       const bool beyond = sin_a * min_cos + cos_a * min_sin < 0;
       if (!beyond && box.d_mean.cast<double>().dot(*d_facing) < cos_a * min_cos - sin_a * min_sin) continue;

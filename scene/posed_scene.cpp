@@ -11,7 +11,7 @@
 namespace limn::scene {
 namespace {
 
-// A lost body is not where its track says: it is as if it were not seen.
+// The pose of a lost body is not reliable, so the body counts as not seen.
 const Track* find_track(std::span<const Track> tracks, const std::string& body) {
   const auto found = std::find_if(tracks.begin(), tracks.end(), [&](const Track& t) {
     return t.body == body && t.tracking != TrackingState::lost;
@@ -19,14 +19,15 @@ const Track* find_track(std::span<const Track> tracks, const std::string& body) 
   return found == tracks.end() ? nullptr : &*found;
 }
 
-// What no covariance of corners knows of: how far the mesh, the calibration and a marker's paper are from the
-// true surface. It also keeps a covariance that is exact along some line invertible.
+// Errors that the corners' covariance does not contain: the distance of the mesh, the calibration and a
+// marker's paper from the true surface. It also keeps a covariance invertible that is zero along some line.
 constexpr double k_unknown_place = 0.2e-3;  // m
 
-// Of the marker's centre in the prototype's frame, from the covariances of both poses.
+// Covariance of the marker's centre in the prototype's frame, from the covariances of both poses.
 Eigen::Matrix3d place_covariance(const Track& prototype, const Track& marker) {
   const Eigen::Vector3d d = marker.world_from_body.translation - prototype.world_from_body.translation;
-  Eigen::Matrix<double, 3, 6> by_prototype;    // d_world of R^T (p - t), by the delta of the prototype's pose
+  Eigen::Matrix<double, 3, 6>
+      by_prototype;  // derivative of R^T (p - t), in world axes, by the delta of the prototype's pose
   by_prototype << 0, -d.z(), d.y(), -1, 0, 0,  //
       d.z(), 0, -d.x(), 0, -1, 0,              //
       -d.y(), d.x(), 0, 0, 0, -1;
@@ -37,11 +38,11 @@ Eigen::Matrix3d place_covariance(const Track& prototype, const Track& marker) {
   return world_from_prototype.transpose() * world * world_from_prototype;
 }
 
-// The marker laid onto the prototype's surface, three degrees of freedom instead of six: centre on the
-// likeliest point (a lone marker's depth is uncertain, so it slides along the line of sight), z into the
-// surface by the shortest turn, so that its turn about z stays; the two planar branches differ by just such a
-// turn. The side of the surface is the one the marker faces, so that a mesh with its normals inside out
-// serves, too.
+// The marker's pose moved onto the prototype's surface, which leaves three degrees of freedom of six. The
+// centre goes to the most likely point: the depth of a single marker is uncertain, so it moves along the
+// viewing ray. The smallest rotation turns z into the surface, so that the rotation about z stays; the two
+// solutions of the planar pose ambiguity differ by just such a rotation. The marker's own orientation selects
+// the side of the surface, so that a mesh with inverted normals works, too.
 Pose laid_on(const Mesh& mesh, const Track& prototype, const Track& marker) {
   const Pose prototype_from_marker = prototype.world_from_body.inverse() * marker.world_from_body;
   const MeshPoint point =

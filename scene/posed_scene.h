@@ -12,7 +12,7 @@
 
 namespace limn::scene {
 
-/// A slot's part in its place.
+/// A slot's part with its pose.
 struct PosedPart {
   std::string slot;
   std::string variant;
@@ -25,36 +25,38 @@ struct PosedPart {
 struct PosedScene {
   std::optional<Pose> world_from_prototype;
   std::vector<PosedPart> parts;
-  std::vector<Viewpoint> viewpoints = {};  ///< of the viewers whose markers are seen and of fixed ones
-  std::optional<RoomLight> light = {};     ///< absent: the scene's own
+  std::vector<Viewpoint> viewpoints = {};  ///< Those of fixed viewers and of viewers whose marker is seen.
+  std::optional<RoomLight> light = {};     ///< Absent: the scene's own light.
 };
 
-/// The scene as the tracks (bodies of `bodies(scene)`) place it; `variants[i]` is the chosen variant of slot
-/// i (absent: its first). A part that sticks to the surface is laid onto the prototype's mesh: its marker's
-/// centre at the likeliest point of the mesh, by the covariances of its track and the prototype's (a track
-/// without one goes to the nearest point); its z axis along the inward normal there; turned as the marker is
-/// turned.
+/// The scene with the poses of the tracks (of `bodies(scene)`). `variants[i]` is the chosen variant of slot i
+/// (absent: its first). With stick_to_surface a marker's pose is moved onto the prototype's mesh: the centre
+/// to the most likely point of the mesh, by the covariances of its track and the prototype's (without
+/// covariances the nearest point); the z axis along the inward normal there; the rotation about z stays.
 PosedScene posed(const Scene& scene,
                  std::span<const Track> tracks,
                  std::span<const std::string> variants = {});
 
-/// What viewers look at: the middle of the prototype, of the parts without one. nullopt: of nothing.
+/// The point that viewers look at: the middle of the prototype, or of the parts if there is no prototype.
+/// Nullopt when there are no parts either.
 std::optional<Eigen::Vector3d> middle_of(const Scene& scene, const PosedScene& posed);
 
-/// A viewer with its eye there, looking at the middle of the scene as posed, 1280 x 800 pixels and 40 degrees
-/// wide, with `d_up_world` up; nullopt when there is nothing to look at.
+/// A viewer at `p_eye_world` that looks at the middle of the posed scene, with `d_up_world` up, 1280 x 800
+/// pixels and a field of view of 40 degrees. Nullopt when there is nothing to look at.
 std::optional<Imager> viewer_at(const Eigen::Vector3d& p_eye_world,
                                 const Scene& scene,
                                 const PosedScene& posed,
                                 const Eigen::Vector3d& d_up_world);
 
-/// The viewer of a scene as posed: its only one if that is fixed, else viewer_at the eye that the viewers
-/// share once all is calm (for moments in a row: followed). nullopt when there is none, or none was seen.
+/// The viewer of a posed scene: its only viewer if that is fixed, else viewer_at() the shared viewpoint to
+/// which updated_viewpoint() converges (call that function for a series of moments). Nullopt when there is no
+/// viewer, none was seen, or there is nothing to look at.
 std::optional<Imager> viewer_of(const Scene& scene,
                                 const PosedScene& posed,
                                 const Eigen::Vector3d& d_up_world);
 
-/// POSES.json (docs/formats.md). An unknown slot or variant is an error; a missing variant is the first one.
+/// Reads POSES.json (docs/formats.md). An unknown slot or variant is an error; a missing variant means the
+/// slot's first one.
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene);
 
 }  // namespace limn::scene

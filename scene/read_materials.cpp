@@ -36,7 +36,7 @@ Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path,
   cv::Mat image = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
   if (image.empty()) {
     return error(
-        "{}: expected a PNG or JPEG as its embedded texture, found {} bytes that are neither. "
+        "{}: expected a PNG or JPEG as embedded texture, found {} bytes of something else. "
         "Export the mesh again.",
         path.string(), texture.mWidth);
   }
@@ -44,7 +44,7 @@ Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path,
   return image;
 }
 
-// Where a texture named by a mesh is: as written there, else by its bare name beside the mesh.
+// The path of a texture that a mesh names: as written, or else the bare file name beside the mesh.
 fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
   std::string slashes = name;
   std::replace(slashes.begin(), slashes.end(), '\\', '/');
@@ -60,8 +60,8 @@ Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, 
   return image;
 }
 
-// The alpha under which a glTF material has nothing; 0: it has no such places. What is half transparent
-// (alphaMode BLEND) is whole from a half on: light cannot be seen through.
+// The alpha below which a glTF material has holes; 0: it has none. Transparency (alphaMode BLEND) is rounded
+// at one half, because projected light cannot be transparent.
 float cut_below(const aiMaterial& source) {
   aiString mode;
   if (source.Get(AI_MATKEY_GLTF_ALPHAMODE, mode) != AI_SUCCESS || mode == aiString("OPAQUE")) return 0;
@@ -70,8 +70,8 @@ float cut_below(const aiMaterial& source) {
   return cutoff;
 }
 
-// What is cut out takes the colour of what is next to it, which filtering mixes with it. False: nothing is
-// left.
+// Gives holes the colour of the nearest opaque texel, because texture filtering mixes the two. False when the
+// whole texture is a hole.
 bool spread_into_holes(float below, cv::Mat* bgra) {
   cv::Mat alpha, labels, distances;
   cv::extractChannel(*bgra, alpha, 3);
@@ -96,7 +96,7 @@ bool spread_into_holes(float below, cv::Mat* bgra) {
   return true;
 }
 
-// Assimp's translation belongs to a turn about the image's middle; glTF turns about its upper left corner.
+// Assimp's translation is for a rotation about the image's middle; glTF rotates about the upper left corner.
 TexturePlace place_of(const aiMaterial& source, aiTextureType type) {
   TexturePlace out;
   source.Get(AI_MATKEY_UVWSRC(type, 0), out.coordinates);
@@ -112,12 +112,12 @@ TexturePlace place_of(const aiMaterial& source, aiTextureType type) {
   return out;
 }
 
-// The images that a file's materials name: each is read once and shared.
+// The images that a file's materials name. Each is read once and shared.
 class Images {
  public:
   Images(const aiScene& scene, const fs::path& path) : scene_(scene), path_(path) {}
 
-  // 8-bit BGR, or BGRA where it has alpha and that is wanted.
+  // Reads 8-bit BGR, or BGRA if the image has alpha and `with_alpha` is set.
   Result<Texture> read(const aiString& name, bool with_alpha) {
     const auto known = known_.find({name.C_Str(), with_alpha});
     if (known != known_.end()) return known->second;
@@ -135,7 +135,7 @@ class Images {
   std::map<std::pair<std::string, bool>, Texture> known_;
 };
 
-// One material while it is read.
+// Reads one material.
 class MaterialReader {
  public:
   MaterialReader(const aiMaterial& source, std::string name, Images* images)
@@ -159,7 +159,7 @@ class MaterialReader {
   }
 
  private:
-  // `alpha` multiplies the texture's.
+  // `alpha` multiplies the texture's alpha.
   Status read_base_texture(float alpha, Material* material) {
     const float below = cut_below(source_);
     const float texture_below = below > 0 ? below / std::max(alpha, 1e-6F) : 0;
@@ -173,14 +173,15 @@ class MaterialReader {
     }
     if (below <= 0) return {};
     const bool has_alpha = material->texture.channels() == 4;
-    if (has_alpha) material->texture = material->texture.clone();  // what is in its holes is this material's
+    if (has_alpha) material->texture = material->texture.clone();  // each material fills its own holes
     const bool is_seen = has_alpha ? spread_into_holes(texture_below, &material->texture) : alpha >= below;
     if (is_seen && has_alpha) material->cut_below = texture_below;
     if (is_seen) return {};
     if (has_alpha) cv::cvtColor(material->texture, material->texture, cv::COLOR_BGRA2BGR);
     log_warning(
-        "{}: expected an alpha of {} or more somewhere in its texture and base colour, found less all over; "
-        "it is shown as if it were opaque. Raise its alpha where the part is to be seen.",
+        "{}: expected an alpha of {} or more somewhere in its texture and base colour, found less "
+        "everywhere. "
+        "It is shown as opaque. Raise the alpha where the part shall be visible.",
         name_, below);
     return {};
   }
@@ -206,8 +207,8 @@ class MaterialReader {
       material->emitted.setZero();
   }
 
-  // Without an image: the material names none. nullopt: it cannot be read, which is told, and what is shown
-  // instead.
+  // A texture without an image when the material names none. Nullopt when the image cannot be read; a warning
+  // then says how the material is shown (`instead`).
   std::optional<Texture> map_of(aiTextureType type, const std::string& what, const std::string& instead) {
     aiString name;
     if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return Texture{};
@@ -215,20 +216,21 @@ class MaterialReader {
     auto texture = images_.read(name, false);
     if (texture) return std::move(texture).value();
     log_warning(
-        "{}: expected a readable {}, found none ({}); it is shown {}. Save the texture beside the mesh, or "
-        "export it again.",
+        "{}: expected a readable {}, found none ({}). The material is shown {}. Save the texture beside the "
+        "mesh, or export the mesh again.",
         name_, what, texture.message(), instead);
     return std::nullopt;
   }
 
-  // All textures of a material lie in one place.
+  // Warns when a texture's mapping differs from the one that all textures of the material are shown with.
   void note_place(aiTextureType type, const std::string& what) const {
     const TexturePlace own = place_of(source_, type);
     const bool is_moved = !own.moved.isApprox(place_.moved, 1e-5F);
     if (own.coordinates == place_.coordinates && !is_moved) return;
     log_warning(
-        "{}: expected its {} where its first texture is, in texture coordinates {}, found {}; it is shown "
-        "there. Bake all its textures into one set of coordinates.",
+        "{}: expected its {} in the texture coordinates of its first texture (set {}), found {}. All "
+        "textures "
+        "are shown in the first one's. Bake all textures into one set of coordinates.",
         name_, what, place_.coordinates,
         own.coordinates != place_.coordinates ? fmt::format("coordinates {}", own.coordinates)
                                               : std::string("another KHR_texture_transform"));
@@ -236,7 +238,7 @@ class MaterialReader {
 
   const aiMaterial& source_;
   TexturePlace place_;
-  std::string name_;  // of file and material, for messages
+  std::string name_;  // names of the file and the material, for messages
   Images& images_;
 };
 

@@ -12,20 +12,20 @@ struct aiScene;
 
 namespace limn::scene {
 
-/// Where a material's textures lie: in which of the file's texture coordinates, and how those are moved
-/// (glTF's KHR_texture_transform). v counts up.
+/// How a material's textures are mapped: which set of the file's texture coordinates they use, and how those
+/// are transformed (glTF's KHR_texture_transform). v counts up.
 struct TexturePlace {
   int coordinates = 0;
   Eigen::Affine2f moved = Eigen::Affine2f::Identity();
 };
 
-/// The place of the base colour texture, without one that of the first texture there is: all of a material
-/// are shown there.
+/// The mapping of the base colour texture, or of the material's first texture if it has no base colour
+/// texture. All textures of the material are shown with this mapping.
 TexturePlace texture_place(const aiMaterial& material);
 
-/// The materials of a mesh file with their textures. Of glTF's, maps beyond the colour that cannot be read
-/// are told and left out; a base colour texture that cannot be read is an error. A texture whose own place is
-/// another than the material's is told.
+/// The materials of a mesh file with their textures. A base colour texture that cannot be read is an error.
+/// Other glTF maps that cannot be read cause a warning and are left out. A texture whose own mapping differs
+/// from the material's causes a warning, too.
 Result<std::vector<Material>> read_materials(const aiScene& scene,
                                              const std::filesystem::path& path,
                                              bool is_gltf);

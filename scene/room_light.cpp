@@ -9,13 +9,13 @@
 namespace limn::scene {
 namespace {
 
-constexpr double k_most_deg = 360, k_most_light = 10;  // of a white surface, full light being 1
+constexpr double k_most_deg = 360, k_most_light = 10;  // light of a white surface; 1 is full light
 
 Eigen::Vector3d read_direction(const ConfigNode& node) {
   const Eigen::Vector3d d = node.vector3();
-  if (std::abs(d.norm() - 1) < 1e-12) return d;  // as it was written
+  if (std::abs(d.norm() - 1) < 1e-12) return d;  // keeps the digits of the file
   if (d.norm() > 1e-9) return d.normalized();
-  node.problem("expected a direction, found a vector of no length.");
+  node.problem("expected a direction, found a vector of length 0.");
   return Eigen::Vector3d::UnitZ();
 }
 
@@ -59,13 +59,13 @@ nlohmann::ordered_json to_json(const RoomLight& light) {
 Result<LightNumbers> light_numbers_of(const std::string& words) {
   std::istringstream text(words);
   double right_deg = 0, up_deg = 0;
-  Eigen::Vector3d strengths;  // of the lamp, above, below
+  Eigen::Vector3d strengths;  // lamp, above, below
   std::string rest;
   if (!(text >> right_deg >> up_deg >> strengths.x() >> strengths.y() >> strengths.z()) || text >> rest ||
       !(std::abs(right_deg) <= k_most_deg && std::abs(up_deg) <= k_most_deg) ||
       !(strengths.minCoeff() >= 0 && strengths.maxCoeff() <= k_most_light))
     return error(
-        "light: expected five numbers, a lamp's degrees to the right and up, its strength and soft light "
+        "light: expected five numbers: a lamp's degrees to the right and up, its strength, and soft light "
         "from "
         "above and below (0 to {}), found '{}'.",
         k_most_light, words);

@@ -15,15 +15,15 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::array<std::uint8_t, 3> k_clay_rgb = {205, 200, 190};
-constexpr double k_fov_deg = 30;   // little perspective, as a long lens
-constexpr double k_margin = 1.12;  // of the surface's radius around it
-constexpr double k_behind = 0.35;  // brightness of a back side
+constexpr double k_fov_deg = 30;   // weak perspective, like a long lens
+constexpr double k_margin = 1.12;  // radius in view, as a multiple of the surface's radius
+constexpr double k_behind = 0.35;  // brightness of triangles seen from behind
 const cv::Scalar k_background_bgr(46, 42, 40);
 
 struct Projected {
   Vector2d px = Vector2d::Zero();
   double inverse_depth = 0;
-  Vector3d colour_bgr = Vector3d::Zero();  // lit
+  Vector3d colour_bgr = Vector3d::Zero();  // after shading
   bool seen = false;
 };
 
@@ -42,8 +42,8 @@ Vector3d lit_colour(const ScanSurface& surface,
 
 std::vector<Projected> corners_of(const ScanSurface& surface, const Imager& viewer) {
   const Pose world_from_viewer = viewer.imager_from_world.inverse();
-  const Vector3d d_light =
-      (world_from_viewer.rotation * Vector3d(-0.45, -0.6, -1)).normalized();  // over the left shoulder
+  const Vector3d d_light = (world_from_viewer.rotation * Vector3d(-0.45, -0.6, -1))
+                               .normalized();  // the light comes over the viewer's left shoulder
   std::vector<Projected> corners(surface.positions.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const Vector3d p = surface.positions[i].cast<double>();
@@ -57,7 +57,7 @@ std::vector<Projected> corners_of(const ScanSurface& surface, const Imager& view
 }
 
 struct Canvas {
-  cv::Mat image, nearest;  // nearest: inverse depth
+  cv::Mat image, nearest;  // `nearest` holds inverse depths
   explicit Canvas(const Imager& viewer)
       : image(viewer.height, viewer.width, CV_8UC3, k_background_bgr),
         nearest(viewer.height, viewer.width, CV_64F, cv::Scalar(0)) {}
@@ -124,7 +124,8 @@ Imager preview_viewer(
 }
 
 std::array<std::uint8_t, 3> signed_colour_rgb(double share) {
-  const double s = std::clamp(share, -1.0, 1.0), size = std::sqrt(std::abs(s));  // small ones are seen, too
+  const double s = std::clamp(share, -1.0, 1.0),
+               size = std::sqrt(std::abs(s));  // the square root makes small values visible
   const Vector3d grey(225, 225, 225), end = s > 0 ? Vector3d(200, 30, 30) : Vector3d(25, 70, 205);
   const Vector3d rgb = grey + size * (end - grey);
   return {static_cast<std::uint8_t>(rgb[0]), static_cast<std::uint8_t>(rgb[1]),

@@ -11,24 +11,25 @@
 
 namespace limn::scene {
 
-/// An image of a surface for people to look at (8-bit BGR): lit from the viewer's side by its normals, in
-/// its colours (clay without any), the nearest triangle in front; without triangles a small square for each
-/// point. Triangles seen from behind are drawn darker. The viewer is an imager without distortion.
+/// An image of a surface for people (8-bit BGR). It is shaded by its normals with light from the viewer's
+/// side, in its own colours (or the colour of clay). The nearest triangle hides others; without triangles
+/// each point is a small square. Triangles seen from behind are darker. The viewer must have no distortion.
 cv::Mat draw_scan_preview(const ScanSurface& surface, const Imager& viewer);
 
-/// A viewer of the given size that has the whole surface in its image, looking from where `d_from` points
-/// to (a direction in the surface's frame, from its middle), with `d_up` up.
+/// A viewer of the given size that sees the whole surface. It stands in direction `d_from` from the surface's
+/// middle (in the surface's frame) and has `d_up` up.
 Imager preview_viewer(const ScanSurface& surface,
                       const Eigen::Vector3d& d_from,
                       const Eigen::Vector3d& d_up,
                       int width,
                       int height);
 
-/// Blue below -1, over grey at 0, to red above 1: the colour of a signed quantity as a share of its limit.
+/// The colour of a signed quantity, given as a share of its limit: from blue at -1 over grey at 0 to red at
+/// 1; shares beyond are clamped.
 std::array<std::uint8_t, 3> signed_colour_rgb(double share);
 
-/// Draws a scale below an image: the colours of signed_colour_rgb from low to high (high its limit) with a
-/// caption in ASCII.
+/// Adds a colour scale below an image: the colours of signed_colour_rgb() from `low_mm` to `high_mm`, where
+/// `high_mm` is the limit, and a caption in ASCII.
 cv::Mat with_scale(const cv::Mat& image, double low_mm, double high_mm, const std::string& caption);
 
 }  // namespace limn::scene

@@ -14,7 +14,7 @@
 namespace limn::scene {
 namespace {
 
-static_assert(std::endian::native == std::endian::little);  // binary PLY is written as memory stands
+static_assert(std::endian::native == std::endian::little);  // binary PLY is written as a copy of memory
 
 template <class T>
 void put(std::string* bytes, const T& value) {
@@ -34,7 +34,7 @@ std::string header_of(const ScanSurface& surface) {
   return text + "end_header\n";
 }
 
-// What a property's values are made of.
+// The type of a property's values.
 struct Type {
   int size = 0;
   bool real = false, sign = false;
@@ -67,7 +67,7 @@ struct Header {
   std::size_t bytes = 0;
 };
 
-// False when a line is none of PLY's.
+// Reads a header line; false when it is not part of PLY.
 bool read_header_line(const std::string& line, Header* header) {
   std::istringstream words(line);
   std::string word;
@@ -96,13 +96,16 @@ bool read_header_line(const std::string& line, Header* header) {
 }
 
 Result<Header> read_header(const std::string& bytes, const std::string& where) {
-  constexpr std::size_t k_longest = 100000;  // a header is text of some lines
+  constexpr std::size_t k_longest = 100000;  // bytes; a header has only a few lines of text
   const std::size_t end = bytes.substr(0, k_longest).find("end_header");
   if (bytes.compare(0, 3, "ply") != 0 || end == std::string::npos)
-    return error("{}: expected a PLY file, found none. Export the scan as PLY.", where);
+    return error("{}: expected a PLY file, found something else. Export the scan as PLY.", where);
   Header header;
   header.bytes = bytes.find('\n', end);
-  if (header.bytes == std::string::npos) return error("{}: the PLY ends after its header.", where);
+  if (header.bytes == std::string::npos)
+    return error(
+        "{}: expected a line after the PLY header, found the end of the file. Copy or export it again.",
+        where);
   ++header.bytes;
   std::istringstream lines(bytes.substr(0, end));
   for (std::string line; std::getline(lines, line);) {
@@ -113,7 +116,7 @@ Result<Header> read_header(const std::string& bytes, const std::string& where) {
   return header;
 }
 
-// The values one by one, whatever the format; `failed` once the file has ended too early.
+// Reads the values one by one, in any format; `failed` is set when the file ends too early.
 class Values {
  public:
   Values(const std::string& bytes, const Header& header)
@@ -161,7 +164,7 @@ class Values {
   bool ascii_, swapped_, failed_ = false;
 };
 
-// Where a vertex' properties go; -1: nowhere.
+// The destination of each property of a vertex; -1: ignored.
 enum Field { k_x, k_y, k_z, k_nx, k_ny, k_nz, k_stddev, k_red, k_green, k_blue, k_fields };
 constexpr const char* k_field_names[k_fields] = {"x",  "y",      "z",   "nx",    "ny",
                                                  "nz", "stddev", "red", "green", "blue"};
@@ -203,7 +206,7 @@ void read_vertices(const Element& element, double metres, Values* values, ScanSu
   }
 }
 
-// False when an index lies beyond the vertices.
+// Reads the faces; false when an index is beyond the vertices.
 bool read_faces(const Element& element, std::size_t vertices, Values* values, ScanSurface* surface) {
   for (std::size_t i = 0; i < element.count && !values->failed(); ++i) {
     for (const Property& property : element.properties) {
@@ -288,11 +291,13 @@ Result<ScanSurface> load_ply(const std::filesystem::path& path, double metres_pe
       skip(element, &values);
     else if (!read_faces(element, surface.positions.size(), &values, &surface))
       return error(
-          "{}: expected faces of the file's own {} points, found an index beyond them. Export it again.",
+          "{}: expected faces with indices of its {} points, found an index beyond them. Export the scan "
+          "again.",
           where, surface.positions.size());
     if (values.failed())
-      return error("{}: the PLY ends inside its {} list: it is truncated. Copy or export it again.", where,
-                   element.name);
+      return error(
+          "{}: expected a complete {} list, found the end of a truncated file. Copy or export it again.",
+          where, element.name);
   }
   LIMN_TRY_STATUS(checked(surface, where));
   if (surface.normals.empty()) surface.normals = normals_from_triangles(surface);

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A file that the scene names; read after the whole scene.json proved right.
+// A file that the scene names. It is read only after the whole scene.json was found valid.
 struct MeshFile {
   std::string where;
   fs::path path;
@@ -30,7 +30,7 @@ struct Reader {
   std::vector<MeshFile> part_meshes;  // in the order of slots and variants
   std::optional<MeshFile> prototype_mesh;
   std::optional<fs::path> albedo_image;
-  std::map<std::string, std::string> marker_users;  // marker -> where it stands
+  std::map<std::string, std::string> marker_users;  // marker -> its key in scene.json
 };
 
 MarkerName read_marker_name(const ConfigNode& node) {
@@ -39,12 +39,12 @@ MarkerName read_marker_name(const ConfigNode& node) {
   return name ? *name : MarkerName{};
 }
 
-// A marker can carry one thing only.
+// A marker can be used once only.
 void claim(const MarkerName& name, const ConfigNode& node, Reader* reader) {
   const auto [user, fresh] = reader->marker_users.try_emplace(name.text(), node.where());
   if (!fresh)
-    node.problem(fmt::format("expected a marker of its own, found {}, which {} uses already.", name.text(),
-                             user->second));
+    node.problem(fmt::format("expected a marker that nothing else uses, found {}, which {} uses already.",
+                             name.text(), user->second));
 }
 
 MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
@@ -103,7 +103,7 @@ void read_variants(const ConfigNode& node, Slot* slot, Reader* reader) {
     item.only({"name", "mesh", "units"});
     Variant variant{item.at("name").text(), {}};
     if (!names.insert(variant.name).second) {
-      item.at("name").problem(fmt::format("expected a name of its own, found '{}' twice.", variant.name));
+      item.at("name").problem(fmt::format("expected a unique name, found '{}' twice.", variant.name));
     }
     reader->part_meshes.push_back(read_mesh_file(item));
     slot->variants.push_back(std::move(variant));
@@ -137,8 +137,7 @@ std::vector<Slot> read_slots(const ConfigNode& node, Reader* reader) {
   for (const ConfigNode& item : node.items()) {
     slots.push_back(read_slot(item, reader));
     if (!names.insert(slots.back().name).second) {
-      item.at("name").problem(
-          fmt::format("expected a name of its own, found '{}' twice.", slots.back().name));
+      item.at("name").problem(fmt::format("expected a unique name, found '{}' twice.", slots.back().name));
     }
   }
   return slots;
@@ -160,7 +159,7 @@ Control read_control(const ConfigNode& node, const Scene& scene) {
 }
 
 int read_side(const ConfigNode& size, double value) {
-  constexpr double k_most = 16384;  // largest image side that GL 4.5 must hold
+  constexpr double k_most = 16384;  // GL 4.5 guarantees textures of this size
   if (value >= 1 && value <= k_most && value == static_cast<int>(value)) return static_cast<int>(value);
   size.problem(fmt::format("expected a whole number of pixels from 1 to {}, found {}.", k_most, value));
   return 1;
@@ -177,17 +176,17 @@ Imager read_viewer_imager(const ConfigNode& node) {
     node.at("fov_deg").problem(fmt::format("expected less than 180 degrees, found {}.", fov_deg));
     fov_deg = 60;
   }
-  if (!(fov_deg > 0)) fov_deg = 60;  // noted already
+  if (!(fov_deg > 0)) fov_deg = 60;  // the problem is already recorded
   return viewer_imager(world_from_viewer, read_side(size, sides[0]), read_side(size, sides[1]), fov_deg);
 }
 
-// A guest's name, or true: every guest's.
+// A guest's name, or true for every guest.
 std::string read_tablet(const ConfigNode& node) {
   if (!node.is_string()) {
     if (!node.boolean()) node.problem("expected true or a guest's name, found false.");
     return "";
   }
-  if (node.text().empty()) node.problem("expected true or a guest's name, found an empty one.");
+  if (node.text().empty()) node.problem("expected true or a guest's name, found an empty text.");
   return node.text();
 }
 
@@ -213,7 +212,7 @@ Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
   return viewer;
 }
 
-// One, or a list of several.
+// Reads one viewer or a list of viewers.
 std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
   if (!node.is_array()) return {read_viewer(node, scene)};
   std::vector<Viewer> viewers;
@@ -223,15 +222,16 @@ std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
     viewers.push_back(read_viewer(item, scene));
     const auto& marker = viewers.back().marker;
     if (marker && !markers.insert(*marker).second)
-      item.at("marker").problem(fmt::format("expected a marker of its own, found {} twice.", marker->text()));
+      item.at("marker").problem(
+          fmt::format("expected a marker that no other viewer uses, found {} twice.", marker->text()));
     const auto& tablet = viewers.back().tablet;
     if (tablet && !tablets.insert(*tablet).second)
-      item.at("tablet").problem("expected another guest's, found the same twice.");
+      item.at("tablet").problem("expected each guest once, found the same guest twice.");
   }
   return viewers;
 }
 
-// A thing that nobody can stand on a table was most likely drawn in another unit.
+// An object much too small or large for a prototype was most likely drawn in another unit.
 Status check_size(const Mesh& mesh, const std::string& units) {
   constexpr double k_smallest_m = 1e-3, k_largest_m = 20;
   constexpr double k_likely_from_m = 0.02, k_likely_to_m = 6;
@@ -246,8 +246,9 @@ Status check_size(const Mesh& mesh, const std::string& units) {
     if (as_m >= k_likely_from_m && as_m <= k_likely_to_m)
       likely.push_back(fmt::format("{} ({:.3g} m)", unit, as_m));
   }
-  return error("expected a thing of 1 mm to 20 m, found one of {:.3g} m across in units \"{}\". {}", size_m,
-               units, likely.empty() ? "Look at the mesh." : "Is its unit " + joined_names(likely) + "?");
+  return error(
+      "expected an object of 1 mm to 20 m, found {:.3g} m across in units \"{}\". {}", size_m, units,
+      likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
 Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
@@ -269,7 +270,7 @@ Status load_albedo_image(const fs::path& path, const fs::path& scene_path, Proto
   }
   if (prototype->mesh.uvs.empty()) {
     return error(
-        "{}: prototype.albedo: expected a mesh with texture coordinates for the picture, found one without. "
+        "{}: prototype.albedo: expected a mesh with texture coordinates for the image, found one without. "
         "Give a number instead, or export the mesh with uv.",
         scene_path.string());
   }
@@ -282,7 +283,8 @@ double longest_side(const Mesh& mesh) {
   return static_cast<double>(box.sizes().maxCoeff());
 }
 
-// Units of a mesh that nobody gave: glTF is in metres; of others the one that makes it as large as parts are.
+// A guess of a mesh's unit: glTF is in metres; for other formats the first unit that gives a part's usual
+// size.
 std::string guessed_units(const fs::path& path, const Mesh& as_metres) {
   if (path.extension() == ".glb" || path.extension() == ".gltf") return "m";
   constexpr double k_least_m = 0.01, k_most_m = 3;
@@ -293,7 +295,7 @@ std::string guessed_units(const fs::path& path, const Mesh& as_metres) {
   return "m";
 }
 
-// What people have said, by variant.
+// The units that people have given, by variant.
 Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
   std::map<std::string, std::string> units;
   std::error_code none;
@@ -307,14 +309,15 @@ Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
   return units;
 }
 
-// A mesh that was laid into a slot's folder; `told`: units by variant, as people have said.
+// Imports a mesh from a slot's folder; `told` has the units that people have given, by variant.
 Result<Variant> auto_import_meshes(const fs::path& file,
                                    const Slot& slot,
                                    const std::map<std::string, std::string>& told) {
   const std::string name = file.stem().string();
   if (find_named(slot.variants, name))
-    return error("{}: expected the name of no other variant of slot '{}', found '{}' twice. Rename the file.",
-                 file.string(), slot.name, name);
+    return error(
+        "{}: expected a file name that no other variant of slot '{}' has, found '{}' twice. Rename the file.",
+        file.string(), slot.name, name);
   LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
   const auto known = told.find(name);
   const bool is_guess = known == told.end();
@@ -327,7 +330,7 @@ Result<Variant> auto_import_meshes(const fs::path& file,
   return variant;
 }
 
-// The variants that scene.json lists, and meshes beside them in slots/NAME/.
+// Loads the variants that scene.json lists, and the meshes in slots/NAME/.
 Status load_variants(std::span<const MeshFile> listed,
                      const fs::path& path,
                      const fs::path& scene_folder,
@@ -370,7 +373,7 @@ Status load_files(const Reader& reader,
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
     for (Material& material : scene->prototype->mesh.materials)
-      material.cut_below = 0;  // what stands there is whole
+      material.cut_below = 0;  // the physical prototype has no transparent parts
     if (reader.albedo_image) {
       LIMN_TRY_STATUS(load_albedo_image(*reader.albedo_image, path, &*scene->prototype));
     }
@@ -425,9 +428,10 @@ Result<Scene> load_scene(const fs::path& path, std::vector<SkippedVariant>* skip
 
 std::string units_question(const Slot& slot, const Variant& variant) {
   if (!variant.auto_imported || !variant.auto_imported->is_guess) return {};
-  return fmt::format("{} of slot '{}' is taken to be in {}, {:.0f} mm long. Is it? If not: units {} {} UNIT",
-                     variant.name, slot.name, variant.auto_imported->units, 1e3 * longest_side(variant.mesh),
-                     slot.name, variant.name);
+  return fmt::format(
+      "{} of slot '{}' is assumed to be in {}, {:.0f} mm long. Is that right? If not: units {} {} UNIT",
+      variant.name, slot.name, variant.auto_imported->units, 1e3 * longest_side(variant.mesh), slot.name,
+      variant.name);
 }
 
 std::string units_json(const Slot& slot, const std::string& variant, const std::string& units) {

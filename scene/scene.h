@@ -15,24 +15,24 @@
 
 namespace limn::scene {
 
-/// The physical thing that is lit. Its frame is its mesh's.
+/// The physical object that is lit. Its coordinate frame is its mesh's.
 struct Prototype {
   Mesh mesh;
-  std::vector<BodyMarker> markers;  ///< body_from_marker is prototype_from_marker
-  double albedo = 0.8;              ///< diffuse, when no image is given
-  cv::Mat albedo_image;             ///< 8-bit BGR sRGB in the mesh's uv; empty: none
+  std::vector<BodyMarker> markers;  ///< body_from_marker is prototype_from_marker.
+  double albedo = 0.8;              ///< Diffuse albedo, used without albedo_image.
+  cv::Mat albedo_image;             ///< 8-bit BGR sRGB in the mesh's uv; empty: none.
 };
 
 enum class Mode {
-  view,    ///< drawn as seen from the viewer's eye (stands off the surface)
-  surface  ///< drawn on the surface itself, the same for every viewer
+  view,    ///< Drawn as seen from the viewpoint, so that it can stand out from the surface.
+  surface  ///< Drawn on the surface itself, the same for every viewer.
 };
 
 struct Variant {
-  /// A mesh that was dropped into the slot's folder.
+  /// A mesh whose file people put into the slot's folder.
   struct AutoImported {
     std::string units;
-    bool is_guess = true;  ///< nobody has said that unit
+    bool is_guess = true;  ///< Whether the unit is a guess, not a person's answer.
   };
   std::string name;
   Mesh mesh;
@@ -50,7 +50,7 @@ struct Slot {
   std::vector<Variant> variants;
 };
 
-/// A marker that acts when covered, turned or laid down.
+/// A marker that triggers an action when it is covered, turned or laid down.
 struct Control {
   MarkerName marker;
   std::string action;
@@ -58,29 +58,30 @@ struct Control {
   std::string gesture;
 };
 
-/// Whose eye `view` parts are drawn for: a fixed imager's, one that stands by a marker (on glasses, on a
-/// cap), or a guest's tablet.
+/// A viewer that `view` parts are drawn for: a fixed imager, a person's eye relative to a marker (on glasses,
+/// on a cap), or a guest's tablet.
 struct Viewer {
-  double weight = 1;  ///< among several
+  double weight = 1;  ///< Weight among several viewers.
   std::optional<Imager> fixed;
   std::optional<MarkerName> marker;
   double marker_size_m = 0;
-  Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();  ///< the eye in the marker's frame
-  /// The guest's name; empty: each guest's is a viewer.
+  Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();  ///< The eye's position in the marker's frame.
+  /// The guest's name; empty: the tablet of every guest is a viewer.
   std::optional<std::string> tablet = {};
 };
 
-/// What is shown: a project folder's scene.json (limn.scene/1), read with everything that it names.
+/// The content of a project folder's scene.json (limn.scene/1), with all files that it names.
 struct Scene {
   std::filesystem::path folder;
-  std::optional<Prototype> prototype;  ///< absent: parts over a camera image only
+  std::optional<Prototype> prototype;  ///< Absent: parts are shown over a camera image only.
   std::vector<Slot> slots;
   std::vector<Control> controls;
-  std::vector<Viewer> viewers;     ///< several share one eye (scene/viewpoint.h)
-  std::optional<RoomLight> light;  ///< absent: soft light and a lamp that stand with the viewer
+  std::vector<Viewer> viewers;     ///< Several share one viewpoint (scene/viewpoint.h).
+  std::optional<RoomLight> light;  ///< Absent: soft light and a lamp that move with the viewer.
 
   const Slot* find_slot(const std::string& name) const;
-  /// The viewer that a guest's tablet is: the one of that name, else the one for all; null: it is none.
+  /// The viewer for a guest's tablet: the one with the guest's name, else the one for every guest. Null when
+  /// the tablet is not a viewer.
   const Viewer* find_tablet(const std::string& guest) const;
 };
 
@@ -89,28 +90,28 @@ struct SkippedVariant {
   std::string slot, variant, why;
 };
 
-/// `path` is the scene.json or its folder. Meshes in its folder slots/NAME/ are variants of slot NAME, too,
-/// called as their files; their units are those of slots/NAME/units.json (limn.units/1), else guessed and
-/// told. A variant that cannot be loaded is an error; with `skipped_variants` it is named there and left out
-/// instead, and a slot that has no other, with its controls, too.
+/// Reads a scene; `path` is the scene.json or its folder. Meshes in slots/NAME/ of the folder become variants
+/// of slot NAME, named after their files. Their units come from slots/NAME/units.json (limn.units/1) or are
+/// guessed, with a message. A variant that cannot be loaded is an error. With `skipped_variants` it is
+/// instead left out and listed there; a slot without any variant is then left out with its controls.
 Result<Scene> load_scene(const std::filesystem::path& path,
                          std::vector<SkippedVariant>* skipped_variants = nullptr);
 
-/// A question for people about a dropped variant whose unit is a guess, and how to answer it; empty for
-/// others.
+/// A question for people about an auto-imported variant whose unit is a guess, with the way to answer it;
+/// empty for other variants.
 std::string units_question(const Slot& slot, const Variant& variant);
-/// slots/NAME/units.json with one more answer.
+/// The text of slots/NAME/units.json with one more unit.
 std::string units_json(const Slot& slot, const std::string& variant, const std::string& units);
 
-/// A viewer file (docs/formats.md): {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
+/// Reads a viewer file (docs/formats.md): {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
-/// What the tracker is to look for: the body "prototype", one body per slot, named as the slot, and
-/// viewer_body(i) where a marker carries viewer i's eye.
+/// The bodies for the tracker: "prototype", one body per slot, with the slot's name, and viewer_body(i) for
+/// each viewer i with a marker.
 std::vector<Body> bodies(const Scene& scene);
-/// No slot's name.
+/// The body's name of a viewer's marker. It differs from every slot's name.
 std::string viewer_body(std::size_t viewer);
-/// The body of a marker that carries nothing in the scene; no slot's name either.
+/// The body's name of a marker that carries nothing in the scene. It differs from every slot's name.
 std::string loose_body(const MarkerName& marker);
 bool is_loose_body(const std::string& body);
 

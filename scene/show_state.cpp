@@ -33,7 +33,7 @@ std::set<std::string> families_of(const Scene& scene) {
   return families;
 }
 
-// What else uses a marker, in words.
+// A description of what else uses a marker, for messages.
 std::optional<std::string> user_of(const Scene& scene,
                                    const ShowState& show_state,
                                    const MarkerName& marker,
@@ -174,7 +174,8 @@ Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& 
     if (slot && marker)
       show_state.slots[static_cast<std::size_t>(slot - scene.slots.data())].marker = *marker;
   }
-  for (std::size_t i = 0; i < scene.slots.size(); ++i)  // all together: they may have changed places
+  for (std::size_t i = 0; i < scene.slots.size();
+       ++i)  // only after reading all, because slots may have exchanged markers
     if (const auto& marker = show_state.slots[i].marker)
       if (const Status can = check_carrier(scene, show_state, *marker, i); !can)
         slots.at(scene.slots[i].name).problem(can.message());

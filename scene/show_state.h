@@ -14,33 +14,33 @@ namespace limn::scene {
 
 /// What a large screen shows.
 enum class Screen {
-  rest,    ///< camera image and what light cannot show
-  full,    ///< camera image and whole parts
-  camera,  ///< camera image alone
-  view,    ///< prototype and parts from the viewer's eye
-  stereo,  ///< the same for two eyes, side by side
+  rest,    ///< The camera image and what projected light cannot show.
+  full,    ///< The camera image and whole parts.
+  camera,  ///< The camera image alone.
+  view,    ///< The prototype and parts from the viewpoint.
+  stereo,  ///< As `view`, for two eyes, side by side.
   off
 };
-const std::vector<std::string>& screen_names();  ///< in the order of Screen
+const std::vector<std::string>& screen_names();  ///< In the order of Screen.
 
-/// An arrangement to come back to: which variants, where they stood on the prototype, of which materials and
-/// in which light.
+/// A saved arrangement: which variants, where on the prototype, of which materials and in which light.
 struct Look {
   struct Part {
     std::string slot;
     std::string variant;
-    Pose prototype_from_part;  ///< world_from_part in a scene without a prototype
+    Pose prototype_from_part;  ///< In a scene without a prototype: world_from_part.
     MaterialOverride material = {};
   };
   std::string name;
   std::vector<Part> parts;
-  std::optional<RoomLight> light = {};  ///< absent: the scene's own
+  std::optional<RoomLight> light = {};  ///< Absent: the scene's own light.
 };
 
-/// A part held where a look had it, until its marker is moved.
+/// A part's pose that is held until its marker is moved.
 struct Pin {
   Pose prototype_from_part;
-  std::optional<Pose> prototype_from_marker;  ///< where the marker stood then; absent until it is seen
+  /// The marker's pose when it was first seen under the pin; absent until then.
+  std::optional<Pose> prototype_from_marker;
 };
 
 /// A screen of the session's devices, and what it shows.
@@ -49,84 +49,89 @@ struct Output {
   Screen shows = Screen::rest;
 };
 
-/// What the people around the prototype have chosen, on top of what the project's files say.
+/// What people have chosen during a session, in addition to the project's files.
 struct ShowState {
   struct Slot {
     std::string variant;
-    Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< along the part's own axes, m
+    Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< Shift along the part's own axes, m.
     std::optional<Pin> pin;
-    std::optional<MarkerName> marker;  ///< carries the part instead of the scene's own
-    MaterialOverride material = {};    ///< of whichever variant is shown
+    std::optional<MarkerName> marker;  ///< Marker that carries the part instead of the scene's own.
+    MaterialOverride material = {};    ///< Applies to all variants of the slot.
   };
-  std::vector<Slot> slots;  ///< in the scene's order
+  std::vector<Slot> slots;  ///< In the scene's order.
   std::vector<Look> looks;
-  std::string look;                  ///< the one last saved or restored; empty: none
-  std::string other_look;            ///< the one before it, which flip comes back to
-  std::optional<Look> deleted_look;  ///< the last one deleted, which can come back
-  bool blackout = false;             ///< bare model: projectors give no light
-  bool frozen = false;               ///< what is shown stays as it is
-  bool marker_states = false;        ///< rings around markers say how they are tracked
-  bool grid = false;                 ///< lines on the prototype, every 10 mm
-  bool split = false;                ///< left of a line the other look, right of it what is shown else
-  double split_mm = 0;               ///< where the line is, along the prototype's x, from its middle
-  Screen screen = Screen::rest;      ///< what was last chosen for all screens
-  std::vector<Output> screens = {};  ///< the session's, in the order of its devices file
-  std::optional<RoomLight> light;    ///< instead of the scene's own
-  Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< for `light` in a scene that has none
-  Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< towards those who look, for `light`
-  std::string viewer;  ///< a guest, for whose tablet `view` parts are drawn; empty: the scene's own viewers
+  std::string look;                  ///< The look last saved or restored; empty: none.
+  std::string other_look;            ///< The look before it, to which `flip` returns.
+  std::optional<Look> deleted_look;  ///< The last deleted look, which can be restored.
+  bool blackout = false;             ///< Projectors give no light: the bare prototype.
+  bool frozen = false;               ///< What is shown does not change.
+  bool marker_states = false;        ///< Rings around markers show how they are tracked.
+  bool grid = false;                 ///< Lines on the prototype, every 10 mm.
+  bool split = false;            ///< Compare: the other look on the left of a line, the present one right.
+  double split_mm = 0;           ///< Position of the line along the prototype's x, from its middle.
+  Screen screen = Screen::rest;  ///< The last choice for all screens.
+  std::vector<Output> screens = {};  ///< The session's screens, in the order of its devices file.
+  std::optional<RoomLight> light;    ///< Light instead of the scene's own.
+  Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< Up for `light` if the scene has no light.
+  Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< Towards the viewers, for `light`.
+  /// A guest for whose tablet `view` parts are drawn; empty: the scene's own viewers.
+  std::string viewer;
 };
 
-/// Each slot's first variant, no looks.
+/// The show state at the start: each slot's first variant, no looks.
 ShowState initial_show_state(const Scene& scene);
 
 /// The names of the looks, in their order.
 std::vector<std::string> look_names(const ShowState& show_state);
-/// Whether a look may have the name: it is also a file's.
+/// Whether a look may have this name, which is also used as a file name.
 bool is_look_name(const std::string& name);
-/// The look of that name; nullptr: there is none.
+/// The look of that name; null when there is none.
 const Look* find_look(const ShowState& show_state, const std::string& name);
-/// The show state with a look's parts where the look has them, in its light; it is then the look last shown.
+/// The show state with the look's variants, poses, materials and light. The look becomes the one last shown.
 ShowState with_look(const Scene& scene, ShowState show_state, const Look& look);
-/// Makes it the look last shown; the one before it is the other one.
+/// Makes it the look last shown; the former one becomes `other_look`.
 void remember_look(const std::string& name, ShowState* show_state);
 
-/// What a screen shows; one that the show state does not know: what was chosen for all.
+/// What a screen shows; for an unknown screen, the last choice for all screens.
 Screen screen_content(const ShowState& show_state, const std::string& screen);
 
 /// The marker that carries a slot's part.
 const MarkerName& slot_marker(const Scene& scene, const ShowState& show_state, std::size_t slot);
 
-/// Whether a marker may carry a slot's part. Error: it is of no family that the scene uses, or carries or
-/// does something else.
+/// Whether a marker may carry a slot's part. Error: the scene does not use its family, or the marker already
+/// carries or controls something else.
 Status check_carrier(const Scene& scene,
                      const ShowState& show_state,
                      const MarkerName& marker,
                      std::size_t slot);
 
-/// Tracks by what they carry: a slot's is its carrier's, under the slot's name; loose markers keep theirs.
+/// Renames tracks by what their marker carries: the track of the marker that carries a slot gets the slot's
+/// name. Tracks of other bodies and of loose markers keep their names. The track of a slot's own marker is
+/// dropped when that marker carries nothing.
 std::vector<Track> assign_tracks(const Scene& scene,
                                  const ShowState& show_state,
                                  std::span<const Track> tracks);
 
-/// The show state once pins have gone of parts whose marker was moved on the prototype by more than 10 mm or
-/// 5 degrees since it was first seen under the pin. Tracks as of carried().
+/// The show state without the pins of parts whose marker was moved on the prototype by more than 10 mm or
+/// 5 degrees since it was first seen under the pin. `tracks` come from assign_tracks().
 ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
-/// The scene as tracks (carried()) and people place it: posed() with the chosen variants, nudged, pinned
-/// parts where their look had them, in the materials and the light that people chose.
+/// The scene at a moment, from tracks (of assign_tracks()) and the show state: posed() with the chosen
+/// variants, nudges, pins, materials and light.
 PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
-/// What is left of a line shows the other look: the same show state as it. Nothing without one.
+/// The show state that is drawn on the left of the split line: this one with the other look. Nullopt without
+/// a split or another look.
 std::optional<ShowState> left_of_split(const Scene& scene, const ShowState& show_state);
 
-/// limn.pairings/1: the slots that other markers than the scene's carry. As text, empty when there are none;
-/// and into a staging. Errors: unknown slots, families that the scene does not use, a marker used twice.
+/// The text of a limn.pairings/1 file: the slots that are carried by other markers than the scene's; empty
+/// when there are none. with_pairings() reads the file into a show state. Errors: unknown slots, families
+/// that the scene does not use, a marker used twice.
 std::string pairings_json(const Scene& scene, const ShowState& show_state);
 Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& scene, ShowState show_state);
 
-/// limn.look/1 as text, and back. A look without materials or light has the files' own. Error: unknown slots
-/// or variants, numbers that are no pose, material or light.
+/// The text of a limn.look/1 file; load_look() reads it. A look without materials or light uses those of the
+/// project's files. Error: unknown slots or variants, or numbers that are not a pose, material or light.
 std::string look_json(const Look& look);
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene);
 

@@ -21,8 +21,8 @@ Vector3f unit_or_zero(Vector3f v) {
   return v;
 }
 
-// Of a triangle's corner: towards growing u in the plane of its normal, handedness, and its weight (0:
-// unknown).
+// The tangent of a triangle's corner: direction of increasing u in the plane of its normal, handedness, and
+// weight (0: unknown).
 struct CornerTangent {
   Vector3f d_u = Vector3f::Zero();
   bool is_mirrored = false;
@@ -46,7 +46,7 @@ CornerTangent corner_tangent(const Mesh& mesh, const std::array<std::uint32_t, 3
   return tangent;
 }
 
-// One for each corner of each triangle.
+// Tangents from the uvs, one for each corner of each triangle.
 std::vector<Vector4f> made_from_uvs(const Mesh& mesh) {
   using BothHands = std::array<Vector3f, 2>;
   std::vector<BothHands> sums(mesh.positions.size(), BothHands{Vector3f::Zero(), Vector3f::Zero()});

@@ -10,13 +10,14 @@
 namespace limn::scene {
 namespace {
 
-constexpr double k_nearest = 0.05;  // m; an eye nearer to the middle counts as this far
+constexpr double k_nearest = 0.05;  // m; a nearer eye counts as if it had this distance from the middle
 
 double count_of(const Viewpoint& eye, const Eigen::Vector3d& p_middle) {
   return eye.weight / std::max(k_nearest, (eye.p_world - p_middle).norm());
 }
 
-// 1 within `full_weight_deg` of the leader's direction, falling smoothly to 0 at `zero_weight_deg`.
+// Weight by direction: 1 within `full_weight_deg` of the leader's, falling smoothly to 0 at
+// `zero_weight_deg`.
 double beside(const Eigen::Vector3d& d,
               const Eigen::Vector3d& d_leader,
               const SharedViewpointOptions& options) {
@@ -26,7 +27,7 @@ double beside(const Eigen::Vector3d& d,
   return t * t * (3 - 2 * t);
 }
 
-// Who leads: the one before, unless gone or outdone.
+// The leader: the previous one, unless it is gone or another counts `takeover_ratio` times more.
 const Viewpoint& leader_of(std::span<const Viewpoint> viewpoints,
                            const std::string& before,
                            const Eigen::Vector3d& p_middle,
@@ -41,7 +42,7 @@ const Viewpoint& leader_of(std::span<const Viewpoint> viewpoints,
   return count_of(most, p_middle) > takeover_ratio * count_of(*known, p_middle) ? most : *known;
 }
 
-// The shares of all who are gone as one, which leaves the eye where it is.
+// Joins the shares of all viewers who are gone into one; the shared position does not change.
 void join_gone(std::span<const Viewpoint> viewpoints, std::vector<SharedViewpoint::Share>* shares) {
   SharedViewpoint::Share gone;
   const auto is_gone = [&](const SharedViewpoint::Share& share) {
@@ -80,7 +81,7 @@ SharedViewpoint updated_viewpoint(const SharedViewpoint& before,
   if (viewpoints.empty()) return after;
   const Viewpoint& leader = leader_of(viewpoints, before.leader, p_middle_world, options.takeover_ratio);
   after.leader = leader.viewer;
-  std::vector<double> wanted(after.shares.size(), 0);  // of those that are gone
+  std::vector<double> wanted(after.shares.size(), 0);  // final shares; 0 for viewers who are gone
   double sum = 0;
   for (const Viewpoint& eye : viewpoints) {
     const auto known = std::find_if(after.shares.begin(), after.shares.end(),
@@ -95,7 +96,7 @@ SharedViewpoint updated_viewpoint(const SharedViewpoint& before,
                  beside(eye.p_world - p_middle_world, leader.p_world - p_middle_world, options);
     sum += wanted[at];
   }
-  double passing = 0;  // share that is to change hands
+  double passing = 0;  // total share that has to move between viewers
   for (std::size_t i = 0; i < wanted.size(); ++i) {
     wanted[i] /= sum;
     passing += 0.5 * std::abs(wanted[i] - after.shares[i].share);

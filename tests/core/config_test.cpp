@@ -14,7 +14,7 @@ class ConfigFile : public testing::Test {
     EXPECT_TRUE(write_file(path_, text));
     return Config::load(path_, schema);
   }
-  // Message of the problem that `read` runs into.
+  // The message of the first problem that `read` causes.
   template <class Read>
   std::string message(const std::string& text, Read read) {
     const auto config = load(text);

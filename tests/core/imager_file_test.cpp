@@ -41,7 +41,7 @@ TEST(Imager, HalfTheResolutionSeesTheSameRays) {
       "c", 640, 480, Lens::create("LENSMODEL_OPENCV4", {700, 710, 320, 240, -0.1, 0, 0, 0}).value(), {}};
   const auto half = resized(whole, 320, 240);
   ASSERT_TRUE(half);
-  const Eigen::Vector3d p(0.2, -0.1, 1);  // a pixel's left edge at -0.5 stays the image's left edge
+  const Eigen::Vector3d p(0.2, -0.1, 1);  // the image's left edge stays at -0.5 px
   EXPECT_TRUE(test::near(half->project(p)->array() + 0.5, (whole.project(p)->array() + 0.5) / 2, 1e-9));
   EXPECT_FALSE(resized(whole, 320, 320));
 }
@@ -64,7 +64,8 @@ const std::vector<double> k_matrix = {700, 0, 320, 0, 0, 705, 240, 0, 0, 0, 1, 0
 
 TEST(ImagerFile, ReadsArtoolkitVersion4AsTheSameLens) {
   const auto path = test::test_folder() / "camera_para.dat";
-  // scale 1.02: the matrix holds fx / scale, so that the pair means an OpenCV lens of focal length 714, 719.1
+  // With scale 1.02 the matrix contains fx / scale, which means an OpenCV lens of focal lengths 714 and
+  // 719.1.
   ASSERT_TRUE(
       write_file(path, artoolkit_file(k_matrix, {0.1, -0.5, 0.001, -0.002, 714, 719.1, 320, 240, 1.02})));
   const auto camera = load_imager(path);
@@ -82,7 +83,8 @@ TEST(ImagerFile, RefitsArtoolkitVersion1) {
   ASSERT_TRUE(write_file(path, artoolkit_file(k_matrix, {318.5, 263.5, 26.2, 1.012757})));
   const auto camera = load_imager(path);
   ASSERT_TRUE(camera) << camera.message();
-  // The ideal pixel (500, 100), by hand: n = 1.012757 * (181.5, -163.5), r2 = 61206, factor 1 - 26.2e-8 * r2.
+  // The ideal pixel (500, 100), computed by hand: n = 1.012757 * (181.5, -163.5), r2 = 61206, factor 1
+  // - 26.2e-8 * r2.
   const Eigen::Vector3d p((500 - 320) / 700.0, (100 - 240) / 705.0, 1);
   const Eigen::Vector2d n = 1.012757 * Eigen::Vector2d(181.5, -163.5);
   const Eigen::Vector2d expected = n * (1 - 26.2e-8 * n.squaredNorm()) + Eigen::Vector2d(318.5, 263.5);

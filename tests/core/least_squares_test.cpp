@@ -30,7 +30,7 @@ struct Valley {
   Matrix2d matrix;
   double cost_here = residuals(state).squaredNorm();
   int linearised = 0;
-  std::vector<double> dampings, costs = {cost_here};  // costs: of the states
+  std::vector<double> dampings, costs = {cost_here};  // `costs` are those of the accepted states
 
   static Vector2d residuals(const Vector2d& p) { return {10 * (p.y() - p.x() * p.x()), 1 - p.x()}; }
   double cost() const { return cost_here; }
@@ -68,14 +68,14 @@ TEST(LeastSquares, FollowsRosenbrocksValleyToItsEnd) {
   EXPECT_LT((valley.state - Vector2d(1, 1)).norm(), 1e-9);
   EXPECT_EQ(found.cost, valley.cost_here);
   EXPECT_EQ(found.steps, static_cast<int>(valley.dampings.size()));
-  EXPECT_GT(found.steps, 3) << "the valley is bent: one step cannot be enough";
+  EXPECT_GT(found.steps, 3) << "the valley is curved, so one step cannot be enough";
 }
 
 TEST(LeastSquares, TheCostNeverRises) {
   Valley valley;
   minimise(&valley, {});
   for (std::size_t i = 1; i < valley.costs.size(); ++i) EXPECT_LE(valley.costs[i], valley.costs[i - 1]);
-  // Some steps were vain on the way, else this says nothing.
+  // Some steps must have been rejected, otherwise the test proves nothing.
   EXPECT_LT(valley.costs.size() - 1, valley.dampings.size());
 }
 
@@ -118,7 +118,7 @@ TEST(LeastSquares, SaysWhenStepsDoNotSuffice) {
   const LeastSquaresSummary found = minimise(&valley, {.max_steps = 3});
   EXPECT_EQ(found.end, LeastSquaresEnd::too_many_steps);
   EXPECT_EQ(found.steps, 3);
-  EXPECT_EQ(found.cost, valley.costs.back()) << "what was reached is kept";
+  EXPECT_EQ(found.cost, valley.costs.back()) << "the best state is kept";
 }
 
 TEST(LeastSquares, NeverEntersWhereTheCostIsNotFinite) {
@@ -185,7 +185,7 @@ TEST(LeastSquares, DampsMoreWhereThereIsNoStepOrEndsAsAsked) {
   EXPECT_EQ(minimise(&never, {.damps_more_without_step = true}).end, LeastSquaresEnd::no_step);
 }
 
-// A line y = a + b x through points, some of which lie elsewhere.
+// A line y = a + b x through points, some of which are outliers.
 template <class Loss>
 struct Line {
   Loss loss;
@@ -245,7 +245,7 @@ double error_of_line(const Loss& loss) {
 
 TEST(LeastSquares, RobustLossesHoldALineAgainstOutliers) {
   const double plain = error_of_line(HuberLoss{0});
-  EXPECT_GT(plain, 0.3) << "a tenth of the points, 5 off: plain squares follow them";
+  EXPECT_GT(plain, 0.3) << "plain squares follow the outliers (a tenth of the points, off by 5)";
   EXPECT_LT(error_of_line(HuberLoss{1.5}), 0.02);
   EXPECT_LT(error_of_line(CauchyLoss(2)), 0.01);
 }

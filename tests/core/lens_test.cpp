@@ -144,7 +144,7 @@ TEST(Lens, PointsBehindHaveNoPixel) {
   EXPECT_FALSE(lens.project({std::nan(""), 0, 1}));
 }
 
-// k1 = -0.15 folds at tan = 1.49; at tan = 2.4 the polynomial alone would answer with a pixel near the
+// A lens with k1 = -0.15 folds at tan = 1.49; at tan = 2.4 the polynomial alone gives a pixel near the
 // centre.
 TEST(Lens, AFoldedPolynomialGivesNoPixelFarOffTheAxis) {
   const Lens lens = Lens::create("LENSMODEL_OPENCV4", {1000, 1000, 640, 400, -0.15, 0, 0, 0}).value();

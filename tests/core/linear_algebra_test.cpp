@@ -40,14 +40,14 @@ TEST(LinearAlgebra, NearestRotationIsOneAndIsFoundInNoise) {
           .norm(),
       1e-12);
   const Eigen::Matrix3d mirrored = turned * Eigen::Vector3d(1, 1, -0.1).asDiagonal();
-  EXPECT_LT((nearest_rotation(mirrored) - turned).norm(), 1e-12);  // no reflection
+  EXPECT_LT((nearest_rotation(mirrored) - turned).norm(), 1e-12);  // a rotation, not a reflection
 }
 
 TEST(LinearAlgebra, TurnsOneDirectionIntoAnother) {
   const Eigen::Vector3d from(0.2, -3, 1), to(-4, 0.1, 0.3);
   const Eigen::Quaterniond turn = rotation_between(from, to);
   EXPECT_LT((turn * from.normalized() - to.normalized()).norm(), 1e-14);
-  EXPECT_NEAR(turn.vec().dot(from), 0, 1e-12);  // the shortest: about an axis across both
+  EXPECT_NEAR(turn.vec().dot(from), 0, 1e-12);  // the smallest rotation has an axis perpendicular to both
   EXPECT_NEAR(turn.vec().dot(to), 0, 1e-12);
 }
 

@@ -38,7 +38,7 @@ TEST(Median, ARankIsFoundInPlaceAndInAPart) {
   std::array<int, 6> values = {5, 3, 1, -9, -8, -7};
   const std::span<int> part(values.data(), 3);
   EXPECT_EQ(value_of_rank(&part, 1), 3);
-  EXPECT_EQ(values[3], -9) << "what is beside the part stays";
+  EXPECT_EQ(values[3], -9) << "values outside the part do not change";
 }
 
 }  // namespace

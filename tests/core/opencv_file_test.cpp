@@ -20,7 +20,7 @@ std::string message(const std::string& text) {
 
 struct OpencvFileOf : testing::TestWithParam<const char*> {};
 
-// What OpenCV itself writes, with all that may stand around what we read.
+// A file that OpenCV itself writes, with everything that can be around the values that Limn reads.
 TEST_P(OpencvFileOf, HoldsWhatOpencvWrote) {
   const auto path = test::test_folder() / (std::string("written.") + GetParam());
   const cv::Mat matrix = (cv::Mat_<double>(2, 3) << 450.25, 0, -317, 1e-20, 1e300, 3);

@@ -80,7 +80,7 @@ TEST(Pose, LookingAtPutsTheTargetAheadAndUpUp) {
   EXPECT_TRUE(test::near(camera_from_world * p_eye, Eigen::Vector3d::Zero(), 1e-14));
   EXPECT_TRUE(test::near(camera_from_world * p_target, Eigen::Vector3d(0, 0, 3), 1e-14));
   EXPECT_LT((camera_from_world.rotation * Eigen::Vector3d::UnitZ()).y(), 0)
-      << "up in the world is -y in the image";
+      << "the world's up direction is -y in the image";
   EXPECT_NEAR(camera_from_world.rotation_matrix().determinant(), 1, 1e-12);
 }
 

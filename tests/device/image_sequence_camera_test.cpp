@@ -24,7 +24,7 @@ TEST(ImageSequenceCamera, PlaysAFolderInTheOrderOfNamesAndEnds) {
   ASSERT_TRUE(camera) << camera.message();
   EXPECT_EQ(camera->size(), cv::Size(8, 6));
   EXPECT_TRUE(camera->is_finite());
-  EXPECT_EQ(camera->description(), "3 stored pictures, 8x6, 20 a second");
+  EXPECT_EQ(camera->description(), "3 stored images, 8x6, 20 per second");
   for (int i = 0; i < 3; ++i) {
     const auto frame = camera->next();
     ASSERT_TRUE(frame) << frame.message();
@@ -51,7 +51,7 @@ TEST(ImageSequenceCamera, AbsentEmptyDamagedAndOddImagesAreErrorsThatNameTheFile
   const auto absent = device::ImageSequenceCamera::open(folder / "nowhere");
   ASSERT_FALSE(absent);
   EXPECT_NE(absent.message().find("nowhere"), std::string::npos);
-  EXPECT_FALSE(device::ImageSequenceCamera::open(folder));  // no image in it
+  EXPECT_FALSE(device::ImageSequenceCamera::open(folder));  // the folder has no image
   ASSERT_TRUE(write_file(folder / "damaged.jpg", "not a picture"));
   EXPECT_FALSE(device::ImageSequenceCamera::open(folder / "damaged.jpg"));
   fs::remove(folder / "damaged.jpg");
@@ -60,7 +60,7 @@ TEST(ImageSequenceCamera, AbsentEmptyDamagedAndOddImagesAreErrorsThatNameTheFile
   auto camera = device::ImageSequenceCamera::open(folder);
   ASSERT_TRUE(camera);
   ASSERT_TRUE(camera->next());
-  for (int attempt = 0; attempt < 2; ++attempt) {  // what cannot be played is not skipped
+  for (int attempt = 0; attempt < 2; ++attempt) {  // an unreadable image is not skipped
     const auto bad = camera->next();
     ASSERT_FALSE(bad);
     EXPECT_NE(bad.message().find("001.png"), std::string::npos) << bad.message();

@@ -25,7 +25,7 @@ std::vector<uchar> encoded(const cv::Mat& image) {
   return bytes;
 }
 
-// Its colours at a lower resolution (TJSAMP_…).
+// The image as JPEG with this chroma subsampling (TJSAMP_…).
 std::vector<uchar> sampled(const cv::Mat& image, int sampling) {
   const tjhandle encoder = tjInitCompress();
   unsigned char* data = nullptr;
@@ -39,7 +39,7 @@ std::vector<uchar> sampled(const cv::Mat& image, int sampling) {
   return bytes;
 }
 
-// Without the segments of a marker (0xc4: Huffman tables).
+// The JPEG without the segments of this marker (0xc4: Huffman tables).
 std::vector<uchar> without_segments(const std::vector<uchar>& jpeg, uchar marker) {
   std::vector<uchar> kept(jpeg.begin(), jpeg.begin() + 2);
   for (std::size_t at = 2; at + 4 < jpeg.size();) {
@@ -134,7 +134,7 @@ TEST(Jpeg, AFrameHoldsItsBrightnessAndItsBytes) {
     const auto grey = decode_frame(jpeg, {.grey = true});
     ASSERT_TRUE(grey);
     EXPECT_TRUE(test::image_near(grey->image, frame->grey, 0, 0, "grey"));
-    EXPECT_FALSE(grey->jpeg) << "a recording would show colours that the session did not";
+    EXPECT_FALSE(grey->jpeg) << "otherwise a recording would show colours that the session did not use";
   }
   EXPECT_FALSE(decode_frame(""));
 }

@@ -35,7 +35,7 @@ TEST(KeySource, SaysWhenItsDeviceIsGone) {
   ASSERT_TRUE(source) << source.message();
   clicker.send_half();
   EXPECT_NE(source->poll_pressed_keys().message().find("Plug it in again"), std::string::npos);
-  EXPECT_FALSE(source->poll_pressed_keys()) << "not tried again at once";
+  EXPECT_FALSE(source->poll_pressed_keys()) << "it is not tried again immediately";
 }
 
 }  // namespace

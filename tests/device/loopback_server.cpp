@@ -15,7 +15,7 @@ LoopbackClient::~LoopbackClient() { close(fd_); }
 
 namespace {
 
-// `call` again while a signal that is no concern of ours interrupts it.
+// Repeats `call` while a signal interrupts it.
 template <class Call>
 ssize_t finished(Call call) {
   ssize_t result = 0;
@@ -65,7 +65,7 @@ void LoopbackServer::run(const std::function<void(LoopbackClient&)>& serve) {
     const int fd = accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
     if (fd < 0) continue;
     ++clients_;
-    timeval limit{2, 0};  // a client that reads no more must not hold the server
+    timeval limit{2, 0};  // a client that stops reading must not block the server
     setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof(limit));
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof(limit));
     LoopbackClient client(fd);

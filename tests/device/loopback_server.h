@@ -16,21 +16,21 @@ class LoopbackClient {
   LoopbackClient& operator=(const LoopbackClient&) = delete;
   ~LoopbackClient();
 
-  /// Sends everything; false once the client has gone.
+  /// Sends everything; false once the client has closed the connection.
   bool send(std::string_view bytes);
-  /// What the client sends, up to and with `end`; shorter when it goes.
+  /// The bytes that the client sends, up to and including `end`; fewer when it closes the connection.
   std::string receive_until(const std::string& end);
 
  private:
   int fd_;
 };
 
-/// A TCP server on 127.0.0.1 that serves one client after another on a thread of its own.
+/// A TCP server on 127.0.0.1 that serves one client after another on its own thread.
 class LoopbackServer {
  public:
-  /// `port` 0: a free one. `serve` speaks to a client until it returns; the connection then ends.
+  /// Port 0 means a free port. `serve` talks to a client; when it returns, the connection ends.
   explicit LoopbackServer(std::function<void(LoopbackClient&)> serve, int port = 0);
-  /// Waits for `serve`, which must return once its sends fail.
+  /// Waits for `serve`, which must return when its sends fail.
   ~LoopbackServer();
 
   int port() const { return port_; }

@@ -1,4 +1,4 @@
-// The camera against a server on the loopback that speaks HTTP as cameras do, well and badly.
+// Tests of MjpegCamera with a server on the loopback that behaves like good and faulty cameras.
 
 #include "device/mjpeg_camera.h"
 
@@ -42,9 +42,9 @@ std::string url(const LoopbackServer& server, const std::string& login = "") {
   return fmt::format("http://{}127.0.0.1:{}/stream", login, server.port());
 }
 
-constexpr double k_clocks_apart_s = 1e-3;  // the kernel stamps by the wall clock, which is regulated
+constexpr double k_clocks_apart_s = 1e-3;  // the kernel stamps by the wall clock, whose rate is adjusted
 
-// Sends images of growing brightness every 5 ms until the client goes.
+// Sends images of increasing brightness every 5 ms until the client closes the connection.
 void stream_well(LoopbackClient& client) {
   client.receive_until("\r\n\r\n");
   bool there = client.send(k_answer);
@@ -97,7 +97,7 @@ TEST(MjpegCamera, GreyWhenAskedTo) {
   EXPECT_EQ(camera->next()->image.type(), CV_8UC1);
 }
 
-// A reader that was away finds the newest image, with the moment at which it came, not that of reading it.
+// After a pause the reader gets the newest image with its arrival time, not the time of reading.
 TEST(MjpegCamera, OldImagesThatWaitAreDropped) {
   std::atomic<bool> is_away = false, are_sent = false, is_over = false;
   Stamp last_sent;
@@ -119,7 +119,7 @@ TEST(MjpegCamera, OldImagesThatWaitAreDropped) {
   ASSERT_TRUE(camera) << camera.message();
   Stamp read_at = Clock::now();
   Result<Frame> frame = camera->next();
-  // The kernel begins to stamp a moment after it is asked to; until then stamps are of reading.
+  // The kernel starts to stamp shortly after the request; until then stamps are the times of reading.
   for (int i = 0; i < 500 && frame && frame->captured_at >= read_at; ++i) {
     pause(20);
     read_at = Clock::now();
@@ -129,17 +129,17 @@ TEST(MjpegCamera, OldImagesThatWaitAreDropped) {
   ASSERT_LT(frame->captured_at, read_at);
   is_away = true;
   while (!are_sent) pause(1);
-  pause(150);  // the kernel has long handed it over, however busy the machine is
+  pause(150);  // enough time for the kernel to deliver it, even on a busy machine
   read_at = Clock::now();
   frame = camera->next();
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(value_of(*frame), 40);
   EXPECT_GE(seconds_between(last_sent, frame->captured_at), -k_clocks_apart_s);
   EXPECT_LT(frame->captured_at, read_at);
-  EXPECT_EQ(camera->description().find(" 0 pictures skipped"), std::string::npos) << camera->description();
+  EXPECT_EQ(camera->description().find(" 0 images skipped"), std::string::npos) << camera->description();
 }
 
-// A server that can be switched off while a client is there.
+// A server that can be switched off while a client is connected.
 struct Switched {
   std::atomic<bool> on = true;
   std::unique_ptr<LoopbackServer> server;
@@ -167,11 +167,11 @@ TEST(MjpegCamera, ReconnectsWhenTheServerComesBack) {
   ASSERT_TRUE(camera->next());
   switched.reset();
   Result<Frame> frame = camera->next();
-  for (int i = 0; frame && i < 100; ++i) frame = camera->next();  // what had arrived before
+  for (int i = 0; frame && i < 100; ++i) frame = camera->next();  // images that had arrived before
   ASSERT_FALSE(frame);
   EXPECT_NE(frame.message().find("refused"), std::string::npos) << frame.message();
   switched = std::make_unique<Switched>(port);
-  for (int i = 0; !frame && i < 6; ++i) frame = camera->next();  // the pause may have grown to 0.8 s
+  for (int i = 0; !frame && i < 6; ++i) frame = camera->next();  // the interval may already be 0.8 s
   EXPECT_TRUE(frame) << frame.message();
   EXPECT_NE(camera->description().find(" 2 connections"), std::string::npos) << camera->description();
 }
@@ -190,7 +190,7 @@ TEST(MjpegCamera, ALostConnectionIsMendedInsideOneCall) {
   EXPECT_GE(server.clients(), 4);
 }
 
-// The camera's error when after one good image the server sends `rest` again and again.
+// The camera's error when the server sends one good image and then `rest` repeatedly.
 std::string problem_after_one_image(const std::string& rest) {
   constexpr double k_limit_s = 1;
   LoopbackServer server([&, first = true](LoopbackClient& client) mutable {

@@ -30,7 +30,7 @@ std::string chunked(const std::string& text, std::size_t size) {
 
 Stamp at(int ms) { return Stamp(std::chrono::milliseconds(ms)); }
 
-// Every image of the bytes when they come in pieces of `step`.
+// All images in the bytes when they arrive in pieces of `step` bytes.
 std::vector<std::string> images(const std::string& bytes, std::size_t step, Status* end = nullptr) {
   MjpegStream stream(k_limit);
   std::vector<std::string> found;
@@ -67,7 +67,7 @@ TEST(MjpegStream, OnlyTheNewestIsKeptAndItsFirstByteIsItsStamp) {
   MjpegStream stream(k_limit);
   ASSERT_TRUE(stream.feed(k_answer + part("old") + part("older still"), at(10)));
   const std::string last = part("newest");
-  ASSERT_TRUE(stream.feed(last.substr(0, last.size() - 8), at(20)));  // its header alone
+  ASSERT_TRUE(stream.feed(last.substr(0, last.size() - 8), at(20)));  // only the part's header
   ASSERT_TRUE(stream.feed(last.substr(last.size() - 8, 3), at(30)));
   EXPECT_EQ(stream.take_newest()->jpeg, "older still");
   EXPECT_FALSE(stream.has_part());
@@ -97,7 +97,7 @@ TEST(MjpegStream, WhatIsWrongIsNamed) {
   contains(problem_of("HTTP/1.1 302 Found\r\nLocation: http://there/\r\n\r\n"), "http://there/");
   contains(problem_of("HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n"), "text/html");
   contains(problem_of("HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace\r\n\r\n"), "boundary");
-  contains(problem_of(k_answer + "--other\r\n"), "\"--frame\" between pictures, found \"--other\"");
+  contains(problem_of(k_answer + "--other\r\n"), "found \"--other\"");
   contains(problem_of(k_answer + "--frame\r\nContent-Length: 2\r\n\r\nabc\r\n"), "found \"c\"");
   contains(problem_of(k_answer + "--frame\r\nContent-Type: text/plain\r\n\r\n"), "text/plain");
   contains(problem_of(k_answer + "--frame\r\nContent-Length: many\r\n\r\n"), "many");
@@ -122,7 +122,7 @@ TEST(MjpegStream, ImagesBeforeAFaultAreGood) {
   EXPECT_FALSE(end);
 }
 
-// Bytes of the right kind in wrong places: every answer is an image or an error.
+// Streams with random damage: every result is an image or an error.
 TEST(MjpegStream, DamagedStreamsNeverBreakIt) {
   auto rng = test::test_rng();
   const std::string lengths = k_answer + part("first") + open_part("second") + part("third");

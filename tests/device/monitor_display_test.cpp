@@ -1,5 +1,5 @@
-// Full-screen displays on a virtual screen (one monitor), and on Xorg's dummy driver (several; on_xorg.sh).
-// What is lit is read back from the X server, not from what was drawn.
+// Tests of full-screen displays on a virtual screen (one monitor) and on Xorg's dummy driver (several
+// monitors, on_xorg.sh). The shown pixels are read back from the X server, not from the drawn image.
 
 #include "device/monitor_display.h"
 
@@ -15,7 +15,7 @@
 #include "device/window.h"
 #include "tests/support/matchers.h"
 
-// After all else: it defines words such as None and Status.
+// Included last, because it defines macros such as None and Status.
 #include <X11/Xlib.h>
 #include <X11/Xutil.h>
 #undef Status
@@ -31,7 +31,7 @@ void contains(const std::string& message, const std::string& part) {
   EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
 }
 
-// Red, green, blue, grey quarters, a white pixel in the top left corner and one in the bottom right.
+// Quarters in red, green, blue and grey, with a white pixel in the top left and the bottom right corner.
 cv::Mat quarters(cv::Size size, int grey) {
   cv::Mat image(size, CV_8UC3, cv::Scalar::all(grey));
   const int w = size.width / 2, h = size.height / 2;
@@ -43,7 +43,7 @@ cv::Mat quarters(cv::Size size, int grey) {
   return image;
 }
 
-// What the X server shows there.
+// The pixels that the X server shows at this position.
 cv::Mat lit(cv::Point position, cv::Size size) {
   ::Display* server = XOpenDisplay(nullptr);
   XImage* x_image =
@@ -61,7 +61,7 @@ cv::Mat lit(cv::Point position, cv::Size size) {
   return image;
 }
 
-// Shows it until the server has it: a swap reaches an X server a moment later.
+// Shows the image until the X server has it, because a swap reaches the server with a delay.
 testing::AssertionResult shows(MonitorDisplay* display, const cv::Mat& image, cv::Point position) {
   cv::Mat found;
   for (int i = 0; i < 50; ++i) {
@@ -108,7 +108,7 @@ TEST_F(AMonitor, IsLitPixelForPixel) {
   const auto context = GlContext::create();
   ASSERT_TRUE(context) << context.message();
   auto window = Window::open(
-      *desktop_, {.title = "beside", .width = 64, .height = 48});  // what else is open does not matter
+      *desktop_, {.title = "beside", .width = 64, .height = 48});  // another open window must not matter
   ASSERT_TRUE(window) << window.message();
   auto display =
       MonitorDisplay::open(*desktop_, {.name = "left", .monitor = first_.name, .size = first_.size});
@@ -123,7 +123,7 @@ TEST_F(AMonitor, IsLitPixelForPixel) {
   cv::merge(std::vector<cv::Mat>{grey, grey, grey}, expected);
   ASSERT_TRUE(display->show(grey));
   EXPECT_TRUE(shows(&*display, expected, first_.position));
-  GLuint texture = 0;  // the headless context is current again
+  GLuint texture = 0;  // the context without a window is current again
   glCreateTextures(GL_TEXTURE_2D, 1, &texture);
   EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
   glDeleteTextures(1, &texture);
@@ -167,7 +167,7 @@ TEST_F(AMonitor, OfAnotherNameOrSizeIsRefused) {
   EXPECT_FALSE(display->show(cv::Mat(first_.size, CV_16UC1, cv::Scalar())));
 }
 
-// The query makes the dummy driver look what is plugged in.
+// The query makes the dummy driver detect which monitors are plugged in.
 void xrandr(const std::string& arguments) {
   ASSERT_EQ(std::system(fmt::format("xrandr {} && xrandr --query >/dev/null", arguments).c_str()), 0)
       << arguments;
@@ -204,7 +204,7 @@ TEST_F(SeveralMonitors, EachShowsItsOwnImage) {
 }
 
 TEST_F(SeveralMonitors, StayInTheirMode) {
-  xrandr("--output DUMMY0 --mode 1024x768 --rate 60 --pos 0x0");  // 75 and 85 Hz are there, too
+  xrandr("--output DUMMY0 --mode 1024x768 --rate 60 --pos 0x0");  // the mode also exists at 75 and 85 Hz
   auto display = opened("DUMMY0", {1024, 768});
   EXPECT_TRUE(shows(&display, quarters({1024, 768}, 100), {0, 0}));
   EXPECT_EQ(desktop_->find("DUMMY0")->refresh_hz, 60);
@@ -217,7 +217,7 @@ TEST_F(SeveralMonitors, AnUnpluggedOneIsNamedShowsNowhereAndComesBack) {
   EXPECT_TRUE(shows(&b, right, {1280, 0}));
   xrandr("--output DUMMY1 --off");
   auto gone = b.show(right);
-  for (int i = 0; gone && i < 100; ++i) {  // until the server has told
+  for (int i = 0; gone && i < 100; ++i) {  // until the X server reports it
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     gone = b.show(right);
   }
@@ -225,7 +225,7 @@ TEST_F(SeveralMonitors, AnUnpluggedOneIsNamedShowsNowhereAndComesBack) {
   contains(gone.message(),
            "on DUMMY1: expected the monitor DUMMY1, found DUMMY0 (1280x800) DUMMY2 (1024x768)");
   EXPECT_TRUE(shows(&a, left, {0, 0}));
-  xrandr("--output DUMMY1 --mode 1024x768 --pos 0x800");  // plugged in elsewhere
+  xrandr("--output DUMMY1 --mode 1024x768 --pos 0x800");  // plugged in at another position
   auto back = b.show(right);
   for (int i = 0; !back && i < 100; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));

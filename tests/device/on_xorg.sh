@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# on_xorg.sh PROGRAM…: runs it on an X server of its own with several monitors, DUMMY0 to DUMMY15, that xrandr
-# plugs in and out (Xorg's dummy driver). DUMMY0 is there at the start. 77 where there is no such server.
+# on_xorg.sh PROGRAM…: runs the program on its own X server with the monitors DUMMY0 to DUMMY15 (Xorg's dummy
+# driver), which xrandr can plug in and out. At the start only DUMMY0 is plugged in. The exit code is 77 when
+# there is no such server.
 set -u
 folder="$(mktemp -d)"
 cat >"$folder/xorg.conf" <<'CONF'

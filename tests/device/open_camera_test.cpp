@@ -37,7 +37,7 @@ TEST(OpenCamera, AnUnknownSourceListsTheForms) {
   for (const char* source : {"", "webcam", "/nowhere/at/all", "ftp://host/"}) {
     const auto camera = open_camera({.name = "left", .source = source});
     ASSERT_FALSE(camera);
-    for (const char* form : {"left: ", "http://", "rtsp://", "folder of pictures"})
+    for (const char* form : {"left: ", "http://", "rtsp://", "folder of images"})
       contains(camera.message(), form);
   }
 }
@@ -45,7 +45,7 @@ TEST(OpenCamera, AnUnknownSourceListsTheForms) {
 TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
   const auto mjpeg = open_camera({.source = "http://127.0.0.1:1/x", .limit_s = 0.1});
   ASSERT_FALSE(mjpeg);
-  contains(mjpeg.message(), "http://127.0.0.1:1/x): expected a picture");
+  contains(mjpeg.message(), "http://127.0.0.1:1/x): expected an image");
   const auto secure = open_camera({.source = "https://127.0.0.1/x", .limit_s = 0.1});
   ASSERT_FALSE(secure);
   contains(secure.message(), "as http://");
@@ -53,8 +53,8 @@ TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
   ASSERT_FALSE(rtsp);
   const auto v4l2 = open_camera({.source = "v4l2:/dev/nowhere", .sensor = {.gain = 1}, .limit_s = 0.1});
   ASSERT_FALSE(v4l2);
-  contains(v4l2.message(), "camera0 (/dev/nowhere): expected a picture");
-  contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected a picture");
+  contains(v4l2.message(), "camera0 (/dev/nowhere): expected an image");
+  contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected an image");
 }
 
 TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {

@@ -30,7 +30,7 @@ struct Jpeg {
   std::string scan;
 };
 
-// The pieces of a baseline JPEG that RFC 2435 sends; its Huffman tables are the standard's.
+// The parts of a baseline JPEG that RFC 2435 sends; its Huffman tables are the standard's.
 Jpeg taken_apart(const cv::Mat& image) {
   std::vector<uchar> bytes;
   cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 90});

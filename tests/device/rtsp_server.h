@@ -7,14 +7,15 @@
 
 namespace limn::test {
 
-/// Speaks RTSP (RFC 2326) to one client up to PLAY and then sends images as RTP (RFC 3550) with JPEG in it
-/// (RFC 2435) over the same connection. Images are BGR, sides multiples of 16.
+/// Serves one client by RTSP (RFC 2326) up to PLAY and then sends images as JPEG (RFC 2435) in RTP (RFC 3550)
+/// over the same connection. Images are BGR; their sides must be multiples of 16.
 class RtspClient {
  public:
-  /// Answers OPTIONS, DESCRIBE, SETUP and PLAY; false when the client goes before.
+  /// Answers OPTIONS, DESCRIBE, SETUP and PLAY; false when the client closes the connection before that.
   static bool begin(LoopbackClient& client);
   explicit RtspClient(LoopbackClient& client) : client_(client) {}
-  /// Sends an image taken at `seconds` of the sender's clock; false once the client has gone.
+  /// Sends an image taken at `seconds` of the sender's clock; false once the client has closed the
+  /// connection.
   bool send(const cv::Mat& image, double seconds);
 
  private:

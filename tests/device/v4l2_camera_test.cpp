@@ -1,5 +1,5 @@
-// The camera against drivers as they behave: a good one, and ones that lie, break or are pulled out. No
-// kernel module can stand in for a camera here, so the ioctls are answered by this file.
+// Tests of V4l2Camera with simulated drivers: a good one, and ones that give false answers, fail or are
+// unplugged. No kernel module can replace a camera here, so this file answers the ioctls.
 
 #include "device/v4l2_camera.h"
 
@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 
 struct Shot {
   std::vector<std::uint8_t> bytes;
-  double age_s = 0.01;  // of its stamp when it is taken
+  double age_s = 0.01;  // age of its stamp when it is dequeued
   std::uint32_t flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
 };
 
@@ -31,9 +31,9 @@ struct Shot {
 struct Driver {
   std::vector<std::uint32_t> formats = {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG};
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
-  v4l2_pix_format format = {};                   // as it stands
-  std::function<void(v4l2_pix_format*)> on_set;  // changes what was asked
-  std::function<void(v4l2_pix_format*)> on_get;  // changes what is told
+  v4l2_pix_format format = {};                   // present format
+  std::function<void(v4l2_pix_format*)> on_set;  // changes the requested format
+  std::function<void(v4l2_pix_format*)> on_get;  // changes the reported format
   std::map<std::uint32_t, int> controls = {{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
                                            {V4L2_CID_EXPOSURE_AUTO_PRIORITY, 1},
                                            {V4L2_CID_EXPOSURE_ABSOLUTE, 250},
@@ -42,13 +42,13 @@ struct Driver {
                                            {V4L2_CID_AUTO_WHITE_BALANCE, 1},
                                            {V4L2_CID_WHITE_BALANCE_TEMPERATURE, 4000}};
   int exposure_step = 1;
-  std::set<std::uint32_t> stuck;          // controls that take a value and keep their own
+  std::set<std::uint32_t> stuck;          // controls that accept a value but keep their own
   std::map<unsigned long, int> refusals;  // request -> errno
   std::uint32_t buffer_count = 4;
-  std::uint32_t buffer_bytes = 0;  // 0: as many as the format needs
+  std::uint32_t buffer_bytes = 0;  // 0: as large as the format needs
   std::uint32_t odd_index = 0;
-  std::deque<Shot> shots;  // empty: the last one again and again
-  std::deque<Shot> later;  // come one by one, when they are waited for
+  std::deque<Shot> shots;  // frames that are ready; when empty, `last` is repeated
+  std::deque<Shot> later;  // frames that become ready one at a time, when the camera waits
   Shot last;
   int opened = 0, closed = 0, streaming = 0, mapped = 0;
   int open_problem = 0;
@@ -176,7 +176,7 @@ struct Driver {
             .unmap = [this](void*, std::size_t) { --mapped; },
             .wait =
                 [this](int, double seconds) {
-                  // With shots named only they are ready; without, one comes whenever it is waited for.
+                  // If there are shots, only these are ready; else a frame comes whenever the camera waits.
                   if (refusals.contains(VIDIOC_DQBUF)) return true;
                   if (seconds > 0 && shots.empty() && !later.empty()) {
                     shots.push_back(later.front());
@@ -187,7 +187,7 @@ struct Driver {
   }
 };
 
-// Brightness `value`, no colour.
+// A grey frame of brightness `value`.
 Shot yuyv(int value) {
   Shot shot;
   for (int i = 0; i < 64 * 48; ++i) {
@@ -212,7 +212,7 @@ void contains(const std::string& message, const std::string& part) {
   EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
 }
 
-// The error of opening.
+// The error message of opening the camera.
 std::string problem(Driver* driver, const V4l2CameraOptions& options = {}) {
   const auto camera = opened(driver, options);
   EXPECT_FALSE(camera);
@@ -240,7 +240,7 @@ TEST(V4l2Camera, DecodesMjpgYuyvAndGrey) {
   frame = opened(&driver)->next();
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(frame->image.type(), CV_8UC3);
-  EXPECT_NEAR(frame->image.ptr()[0], (126 - 16) * 255 / 219, 2);  // YUV's black is 16
+  EXPECT_NEAR(frame->image.ptr()[0], (126 - 16) * 255 / 219, 2);  // black is 16 in YUV
   EXPECT_EQ(opened(&driver, {.grey = true})->next()->image.ptr()[0], 126);
 
   driver.formats = {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_GREY};
@@ -249,7 +249,7 @@ TEST(V4l2Camera, DecodesMjpgYuyvAndGrey) {
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(frame->image.type(), CV_8UC1);
   EXPECT_EQ(frame->image.ptr()[0], 77);
-  EXPECT_EQ(driver.opened, driver.closed + 1);  // `camera` still lives
+  EXPECT_EQ(driver.opened, driver.closed + 1);  // `camera` is still open
 }
 
 TEST(V4l2Camera, RowsMayBeLongerThanTheImage) {
@@ -275,7 +275,7 @@ TEST(V4l2Camera, TheNewestFrameIsKeptAndStampedAtTheMiddleOfItsExposure) {
   for (const int value : {20, 30, 40}) driver.shots.push_back(mjpg(value));
   driver.shots.back().age_s = 0.05;
   const auto is_between = [](Stamp captured_at, Stamp begun, double after_s) {
-    return captured_at >= shifted(begun, after_s - 1e-6) &&  // drivers count microseconds
+    return captured_at >= shifted(begun, after_s - 1e-6) &&  // drivers' stamps have a resolution of 1 us
            captured_at <= shifted(Clock::now(), after_s);
   };
   Stamp begun = Clock::now();
@@ -283,10 +283,10 @@ TEST(V4l2Camera, TheNewestFrameIsKeptAndStampedAtTheMiddleOfItsExposure) {
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_TRUE(is_between(frame->captured_at, begun, -0.05 + 0.04));
   EXPECT_NEAR(frame->image.ptr()[0], 40, 2);
-  EXPECT_EQ(driver.queued.size(), 4u);  // all buffers are the driver's again
+  EXPECT_EQ(driver.queued.size(), 4u);  // the driver has all buffers again
   contains(camera->description(), "2 frames skipped");
 
-  driver.shots.push_back(mjpg(50));  // a stamp of the end of exposure
+  driver.shots.push_back(mjpg(50));  // its stamp is the end of the exposure
   driver.shots.back().flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_EOF;
   begun = Clock::now();
   frame = camera->next();
@@ -294,7 +294,7 @@ TEST(V4l2Camera, TheNewestFrameIsKeptAndStampedAtTheMiddleOfItsExposure) {
   EXPECT_TRUE(is_between(frame->captured_at, begun, -0.05));
 }
 
-// What came while all buffers were filled is lost, and those are from before it.
+// Frames that come while all buffers are full are lost, so the full buffers contain only older frames.
 TEST(V4l2Camera, WhereAllBuffersWereFilledTheNextFrameIsTheNewest) {
   Driver driver;
   driver.last = mjpg(10);
@@ -326,7 +326,7 @@ TEST(V4l2Camera, StampsThatCannotBeAreThoseOfReading) {
     EXPECT_GE(frame->captured_at, begun);
     EXPECT_LE(frame->captured_at, Clock::now());
   }
-  contains(camera->description(), "3 with a stamp that cannot be");
+  contains(camera->description(), "3 with an impossible stamp");
 }
 
 TEST(V4l2Camera, SensorSettingsAreLockedAndReadBack) {
@@ -385,9 +385,9 @@ TEST(V4l2Camera, ADriverThatLiesAboutItsFormatIsNamed) {
     if (++asked % 2 == 0) format->height = 40;
   };
   contains(problem(&forgetful), "then says MJPG 64x40");
-  Driver larger;  // the JPEG holds another size than the format says
+  Driver larger;  // the JPEG has another size than the format
   larger.last = mjpg(10, 80);
-  contains(problem(&larger), "expected a picture of 64x48, found 80x48");
+  contains(problem(&larger), "64x48, found 80x48");
 }
 
 TEST(V4l2Camera, FaultsAreNamedWithWhatToDo) {
@@ -404,7 +404,7 @@ TEST(V4l2Camera, FaultsAreNamedWithWhatToDo) {
   contains(refusing(VIDIOC_S_FMT, EBUSY), "setting its format fails");
   Driver metadata;
   metadata.capabilities = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING;
-  contains(problem(&metadata), "gives no pictures");
+  contains(problem(&metadata), "gives no images");
   Driver exotic;
   exotic.formats = {V4L2_PIX_FMT_H264};
   contains(problem(&exotic), "expected a camera with MJPG, YUYV or GREY, found H264");
@@ -439,7 +439,7 @@ TEST(V4l2Camera, DamagedAndShortFramesArePassedOver) {
   Shot marked = yuyv(1), shorter = yuyv(2), longer = yuyv(3);
   marked.flags |= V4L2_BUF_FLAG_ERROR;
   shorter.bytes.resize(6143);
-  longer.bytes.resize(7000);  // more than its buffer holds
+  longer.bytes.resize(7000);  // more bytes than the buffer has
   for (const Shot& bad : {marked, shorter, longer}) {
     driver.last = bad;
     const auto none = camera->next();
@@ -466,14 +466,14 @@ TEST(V4l2Camera, APulledPlugIsNamedAndTheCameraComesBack) {
   EXPECT_EQ(camera->settings().size(), 0u);
   driver.refusals.clear();
   driver.open_problem = 0;
-  driver.controls[V4L2_CID_EXPOSURE_ABSOLUTE] = 250;  // a camera wakes with its own settings
+  driver.controls[V4L2_CID_EXPOSURE_ABSOLUTE] = 250;  // a camera restarts with its own settings
   Result<Frame> back = camera->next();
   for (int i = 0; !back && i < 8; ++i) back = camera->next();
   ASSERT_TRUE(back) << back.message();
   EXPECT_EQ(driver.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 80);
   contains(camera->description(), "opened 2 times");
 
-  driver.refusals[VIDIOC_DQBUF] = ENODEV;  // another camera under the same path
+  driver.refusals[VIDIOC_DQBUF] = ENODEV;  // then another camera has the same path
   driver.on_set = [](v4l2_pix_format* format) { format->width = 32; };
   EXPECT_FALSE(camera->next());
   driver.refusals.clear();

@@ -1,4 +1,4 @@
-// Video files that OpenCV wrote, and RTSP against a server on the loopback.
+// Tests with video files that OpenCV wrote, and of RTSP with a server on the loopback.
 
 #include "device/video_camera.h"
 
@@ -30,11 +30,11 @@ TEST(VideoClock, AHeldUpFrameKeepsItsOwnMoment) {
   VideoClock clock;
   const auto read = [](double seconds) { return shifted(Stamp{}, 1000 + seconds); };
   clock.stamp(5.0, read(0.030));
-  clock.stamp(5.1, read(0.110));  // the quickest: 10 ms
+  clock.stamp(5.1, read(0.110));  // the least delay: 10 ms
   EXPECT_NEAR(seconds_between(read(0.210), clock.stamp(5.2, read(0.290))), 0, 1e-4);
   EXPECT_NEAR(seconds_between(read(0.310), clock.stamp(5.3, read(0.315))), 0, 1e-4);
-  EXPECT_EQ(clock.stamp(0.0, read(0.4)), read(0.4));  // begun again
-  EXPECT_EQ(clock.stamp(0.0, read(0.5)), read(0.5));  // no times in it
+  EXPECT_EQ(clock.stamp(0.0, read(0.4)), read(0.4));  // a new stream
+  EXPECT_EQ(clock.stamp(0.0, read(0.5)), read(0.5));  // a stream without times
 }
 
 TEST(VideoClock, FollowsASendersClockThatRunsOff) {
@@ -112,7 +112,7 @@ TEST(VideoCamera, AnRtspStreamIsStampedOnArrival) {
     const double sent_s = begun_s + 0.02 * last;
     EXPECT_NEAR(seconds_between(Stamp{}, frame->captured_at), sent_s, 0.08) << last;
   }
-  pause(600);  // a reader that was away gets the newest
+  pause(600);  // after a pause the reader gets the newest frame
   const double now_s = seconds_between(Stamp{}, Clock::now());
   const auto frame = camera->next();
   ASSERT_TRUE(frame) << frame.message();

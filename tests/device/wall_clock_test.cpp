@@ -6,7 +6,7 @@ namespace limn::device {
 namespace {
 
 using Wall = std::chrono::system_clock;
-constexpr double k_regulated_s = 1e-3;  // the wall clock is slowed and hurried by its keepers
+constexpr double k_regulated_s = 1e-3;  // the rate of the wall clock is adjusted by NTP
 
 TEST(WallClock, AMomentKeepsItsPlaceAmongOthers) {
   for (int i = 0; i < 1000; ++i) {

@@ -25,14 +25,14 @@ TEST(Window, ShowsAnImageAndGivesTheContextBack) {
   window->show(image);
   EXPECT_TRUE(window->is_open());
   EXPECT_EQ(window->poll_pressed_key(), 0);
-  // The headless context is current again.
+  // The context without a window is current again.
   EXPECT_NE(context->description().find(reinterpret_cast<const char*>(glGetString(GL_RENDERER))),
             std::string::npos);
   GLuint texture = 0;
   glCreateTextures(GL_TEXTURE_2D, 1, &texture);
   EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
   glDeleteTextures(1, &texture);
-  if (const char* seconds = std::getenv("LIMN_TEST_WINDOW_STAYS")) {  // to look at it
+  if (const char* seconds = std::getenv("LIMN_TEST_WINDOW_STAYS")) {  // for a person to look at the window
     for (int i = 0; i < 20 * std::atoi(seconds) && window->is_open(); ++i) usleep(50000);
   }
 }

@@ -1,4 +1,4 @@
-// The table of actions, and what each of them does.
+// Tests of the table of actions and of each action.
 #include "scene/actions.h"
 
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double k_exact = 1e-12;
 
-// A prototype, a part with three variants and one that was dropped in, and another part.
+// A prototype, a slot with three variants and an auto-imported one, and another slot.
 Scene a_scene() {
   Scene scene;
   scene.prototype = Prototype{};
@@ -33,7 +33,7 @@ Look look_of(const std::string& name, const std::string& variant) {
   return look;
 }
 
-// Looks A, B and C, of which B was shown last and A before it, and one that was deleted.
+// A show state with looks A, B and C (B was shown last, A before it) and one deleted look.
 ShowState a_staging(const Scene& scene) {
   ShowState show_state = initial_show_state(scene);
   show_state.looks = {look_of("A", "a"), look_of("B", "b"), look_of("C", "c")};
@@ -51,7 +51,7 @@ std::string text_of(const Pose& pose) {
   return fmt::format("{} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
 }
 
-// All of a show state, by member, as text. A member that is added does not compile until it is here, too.
+// All members of a show state, as text. A new member causes a compiler error until it is added here, too.
 std::map<std::string, std::string> members_of(const ShowState& show_state) {
   const auto& [slots, looks, look, other_look, deleted_look, blackout, frozen, marker_states, grid, split,
                split_mm, screen, screens, light, d_up_world, d_front_world, viewer] = show_state;
@@ -97,17 +97,17 @@ Members changed(const ShowState& before, const ShowState& after) {
   return out;
 }
 
-// What an action is asked, of which show state, and what it is to change: these members, so that `is_done`
-// holds.
+// A test case of an action: the show state before, the value, the members that must change, and the condition
+// that must then hold.
 struct Case {
   ShowState before;
   std::string value;
   Members members;
   bool (*is_done)(const ShowState& after);
-  std::string slot = "mirror";  // of actions on a slot
+  std::string slot = "mirror";  // only for an action on a slot
 };
 
-// No default: an action without its case is a warning here and a failure below.
+// The switch has no default: an action without a case gives a warning here and a failure below.
 std::optional<Case> case_of(ActionId id, const Scene& scene) {
   const ShowState usual = a_staging(scene);
   ShowState held = usual;
@@ -149,7 +149,7 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
       return Case{held, "", {"slots[0].marker", "slots[0].pin"}, [](const ShowState& s) {
                     return !s.slots[0].marker && !s.slots[0].pin;
                   }};
-    case ActionId::units:  // by the session: beside the part's file (pairing_test)
+    case ActionId::units:  // done by the session, which stores the unit beside the part's file (pairing_test)
       return Case{usual, "new one mm", {}, [](const ShowState&) { return true; }};
     case ActionId::material:
       return Case{usual, "#ffffff 0 0.4", {"slots[0].material"}, [](const ShowState& s) {
@@ -194,7 +194,7 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
       return Case{usual, "", {"looks", "deleted_look"}, [](const ShowState& s) {
                     return s.looks.size() == 4 && s.looks[3].name == "gone" && !s.deleted_look;
                   }};
-    case ActionId::repair:  // by the session's devices (live_test, live_devices_test)
+    case ActionId::repair:  // done by the session's devices (live_test, live_devices_test)
       return Case{usual, "", {}, [](const ShowState&) { return true; }};
     case ActionId::light:
       return Case{usual, "30 45 0.6 0.3 0.1", {"light"}, [](const ShowState& s) {
@@ -235,7 +235,7 @@ TEST(Actions, EachChangesWhatItIsToChangeAndNothingElse) {
     EXPECT_EQ(changed(wanted->before, *after), wanted->members) << action.name;
     EXPECT_TRUE(wanted->is_done(*after)) << action.name;
     if (action.argument_kind != ArgumentKind::on_off) continue;
-    // A switch goes off again, and to the other side.
+    // A switch can be set to off again and toggled.
     const auto value = [&](const std::string& word) {
       return changed(wanted->before,
                      *apply_edit(scene, *after, {}, make_edit(action.id, wanted->slot, word)));
@@ -261,7 +261,7 @@ TEST(Actions, WhatTheSessionDoesIsReadAndRefusedInTime) {
 TEST(Actions, AreFoundByTheirNames) {
   std::set<std::string_view> names;
   for (const Action& action : actions()) {
-    EXPECT_TRUE(names.insert(action.name).second) << action.name << " stands there twice";
+    EXPECT_TRUE(names.insert(action.name).second) << action.name << " is in the table twice";
     EXPECT_EQ(find_action(action.name), &action);
     EXPECT_EQ(&action_of(action.id), &action);
     EXPECT_EQ(make_edit(action.id, "mirror", "x").action, action.name);
@@ -291,11 +291,11 @@ TEST(Actions, WhatIsOppositeGoesThereAndBack) {
 }
 
 TEST(Actions, NoKeyDoesTwo) {
-  std::set<Key> keys = {Key::tab};  // which chooses a slot
+  std::set<Key> keys = {Key::tab};  // Tab selects a slot
   for (const Action& action : actions()) {
     for (const Key key : action.keys) {
       if (key == Key::none) continue;
-      EXPECT_TRUE(keys.insert(key).second) << action.name << " has a key of another";
+      EXPECT_TRUE(keys.insert(key).second) << action.name << " has a key of another action";
     }
     EXPECT_TRUE(action.value_of_keys.empty() || action.keys[0] != Key::none) << action.name;
   }

@@ -28,7 +28,7 @@ fs::path written(const std::string& name, const std::string& content) {
   return path;
 }
 
-// Twelve triangles of a cube of side 2 around the origin, three corners each, outward.
+// Twelve outward triangles of a cube of side 2 around the origin, three corners each.
 std::vector<std::array<Vector3f, 3>> cube() {
   std::vector<std::array<Vector3f, 3>> triangles;
   for (int axis = 0; axis < 3; ++axis) {
@@ -81,7 +81,7 @@ std::string base64(const std::string& bytes) {
   return out;
 }
 
-// One unlit, textured triangle in a node that is moved, turned by 90 degrees about x and scaled by 2.
+// One unlit, textured triangle in a node that is moved, rotated by 90 degrees about x and scaled by 2.
 std::string textured_gltf(const std::string& image) {
   const float data[] = {0, 0, 0, 1, 0, 0, 0, 1, 0, /* uv */ 0, 0, 1, 0, 0, 1};
   const std::string buffer(reinterpret_cast<const char*>(data), sizeof(data));
@@ -151,12 +151,12 @@ TEST(Mesh, GltfNodesUnlitAndEmbeddedTexture) {
   const auto mesh = load_mesh(path, "cm");
   ASSERT_TRUE(mesh) << mesh.message();
   ASSERT_EQ(mesh->positions.size(), 3u);
-  // (0, 1, 0): scaled by 2, turned about x onto z, moved, in centimetres. No axis is swapped.
+  // (0, 1, 0) is scaled by 2, rotated about x onto z and moved, in centimetres. No axis is swapped.
   bool found = false;
   for (std::size_t i = 0; i < 3; ++i) {
     if ((mesh->positions[i] - Vector3f(0.10f, 0.20f, 0.32f)).norm() > 1e-6f) continue;
     found = true;
-    EXPECT_NEAR(mesh->uvs[i].y(), 0, 1e-6);  // glTF's v counts down, ours up
+    EXPECT_NEAR(mesh->uvs[i].y(), 0, 1e-6);  // v counts down in glTF and up in Mesh
   }
   EXPECT_TRUE(found);
   EXPECT_NEAR(mesh->normals[0].y(), -1, 1e-5);
@@ -180,7 +180,7 @@ TEST(Mesh, TextureBesideTheMeshOrAnErrorThatNamesIt) {
   EXPECT_EQ(mesh->materials[mesh->triangle_materials[0]].texture.cols, 2);
 }
 
-// glTF's alphaMode, in the material of textured_gltf.
+// textured_gltf with an alphaMode of glTF in its material.
 std::string gltf_with(const std::string& alpha, const std::string& image) {
   std::string text = textured_gltf(image);
   const std::string before = R"("materials":[{)";
@@ -188,7 +188,7 @@ std::string gltf_with(const std::string& alpha, const std::string& image) {
 }
 
 TEST(Mesh, AlphaOfATextureCutsOut) {
-  // Clear at the left, in black; the right is half clear, then whole.
+  // The left is transparent black, the right is half transparent, then opaque.
   cv::Mat image(1, 3, CV_8UC4, cv::Scalar(10, 200, 30, 255));
   image.at<cv::Vec4b>(0, 0) = {0, 0, 0, 0};
   image.at<cv::Vec4b>(0, 1) = {10, 200, 30, 100};
@@ -207,9 +207,10 @@ TEST(Mesh, AlphaOfATextureCutsOut) {
   const Material masked = loaded(R"("alphaMode":"MASK","alphaCutoff":0.25,)");
   EXPECT_EQ(masked.cut_below, 0.25f);
   ASSERT_EQ(masked.texture.type(), CV_8UC4);
-  EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 0), cv::Vec4b(10, 200, 30, 0));  // no black to bleed in
+  EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 0),
+            cv::Vec4b(10, 200, 30, 0));  // filtering must not mix black in
   EXPECT_EQ(masked.texture.at<cv::Vec4b>(0, 1), cv::Vec4b(10, 200, 30, 100));
-  // Thin everywhere: shown rather than lost.
+  // A material that is transparent everywhere is shown as opaque.
   image.setTo(cv::Scalar(10, 200, 30, 100));
   cv::imencode(".png", image, bytes);
   written("decal/paint.png", std::string(bytes.begin(), bytes.end()));
@@ -234,7 +235,7 @@ TEST(Mesh, TheBaseColoursAlphaMultipliesTheTextures) {
     return mesh->materials[mesh->triangle_materials[0]];
   };
   EXPECT_EQ(loaded("1").cut_below, 0.5f);
-  EXPECT_NEAR(loaded("0.8").cut_below, 0.625, 1e-6);  // of the texture's own alpha
+  EXPECT_NEAR(loaded("0.8").cut_below, 0.625, 1e-6);  // relative to the texture's own alpha
   testing::internal::CaptureStderr();
   const Material faint = loaded("0.25");
   const std::string told = testing::internal::GetCapturedStderr();
@@ -244,8 +245,7 @@ TEST(Mesh, TheBaseColoursAlphaMultipliesTheTextures) {
     EXPECT_NE(told.find(word), std::string::npos) << told;
 }
 
-// textured_gltf with more in its material, whose textures 1 to 4 are these images, and a normal at each
-// corner.
+// textured_gltf with additions to its material, these images as textures 1 to 4, and a normal at each corner.
 std::string gltf_with_maps(const std::string& more, const std::vector<std::string>& files) {
   std::string images = R"("uri":"paint.png")", textures = R"("textures":[{"source":0})";
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -280,7 +280,7 @@ TEST(Mesh, SurfaceMapsOfGltfAreRead) {
   EXPECT_EQ(material.maps.normals.image.at<cv::Vec3b>(0, 0), cv::Vec3b(255, 128, 128));
   EXPECT_EQ(material.maps.metallic_roughness.image.at<cv::Vec3b>(1, 1), cv::Vec3b(51, 102, 153));
   EXPECT_EQ(material.maps.occlusion.image.data,
-            material.maps.metallic_roughness.image.data);  // read once
+            material.maps.metallic_roughness.image.data);  // the image is read only once
   EXPECT_EQ(material.maps.emission.image.at<cv::Vec3b>(0, 1), cv::Vec3b(77, 77, 77));
   EXPECT_NE(material.maps.normals.file.find("normals.png"), std::string::npos);
   EXPECT_EQ(material.maps.normal_scale, 0.5f);
@@ -308,7 +308,7 @@ TEST(Mesh, MapsThatCannotBeReadAreToldAndLeftOut) {
   expect_told({"gone/part.gltf", "'chrome'", "normal texture", "gone.png", "shown smooth"});
   EXPECT_TRUE(loaded(R"("occlusionTexture":{"index":1},)", "torn.png", &told).maps.is_none());
   expect_told({"gone/part.gltf", "'chrome'", "occlusion texture", "torn.png", "soft light everywhere"});
-  // Not full white all over.
+  // Without its texture an emissive material must not be white everywhere.
   EXPECT_TRUE(loaded(R"("emissiveFactor":[1,1,1],"emissiveTexture":{"index":1},)", "gone.png", &told)
                   .emitted.isZero());
   expect_told({"'chrome'", "emissive texture", "without light of its own"});
@@ -318,8 +318,8 @@ TEST(Mesh, MapsThatCannotBeReadAreToldAndLeftOut) {
   expect_told({"'chrome'", "normal texture", "coordinates 1"});
 }
 
-// textured_gltf whose base colour texture says this of its place; its second coordinates are x and y of the
-// positions, read as pairs: (0, 0), (0, 1), (0, 0).
+// textured_gltf with this mapping of its base colour texture. Its second texture coordinates are the
+// positions' numbers, read as pairs: (0, 0), (0, 1), (0, 0).
 std::string placed_gltf(const std::string& place, const std::string& more = "") {
   std::string text = gltf_with_maps(more, {"paint.png"});
   const auto replace = [&](const std::string& before, const std::string& after) {
@@ -339,7 +339,7 @@ std::string moved(const std::string& how) {
   return R"("extensions":{"KHR_texture_transform":{)" + how + "}}";
 }
 
-// The uv of a corner that is at (x, y) in the mesh's own frame.
+// The uv of the corner at (x, y) in the mesh's own frame.
 Vector2d uv_at(const Mesh& mesh, double x, double y) {
   for (std::size_t i = 0; i < mesh.positions.size(); ++i)
     if (test::near(mesh.positions[i].cast<double>(), Vector3d(10 + 2 * x, 20, 30 + 2 * y), 1e-4))
@@ -348,7 +348,7 @@ Vector2d uv_at(const Mesh& mesh, double x, double y) {
   return {};
 }
 
-// glTF's uv have v down, the mesh's up: (0, 0), (1, 0), (0, 1) of the file are (0, 1), (1, 1), (0, 0).
+// v counts down in glTF and up in Mesh: (0, 0), (1, 0), (0, 1) of the file become (0, 1), (1, 1), (0, 0).
 TEST(Mesh, ATextureTransformMovesTheUvs) {
   written("moved/paint.png", small_png());
   const auto loaded = [&](const std::string& how) {
@@ -371,7 +371,7 @@ TEST(Mesh, ATextureTransformMovesTheUvs) {
   expect_uvs("", {0, 0}, {1, 0}, {0, 1});
   expect_uvs(R"("offset":[0.25,0.5])", {0.25, 0.5}, {1.25, 0.5}, {0.25, 1.5});
   expect_uvs(R"("scale":[2,3])", {0, 0}, {2, 0}, {0, 3});
-  // A quarter of a turn, counter-clockwise as the image is seen.
+  // A rotation by 90 degrees, counter-clockwise in the image.
   expect_uvs(R"("rotation":1.5707963)", {0, 0}, {0, -1}, {1, 0});
   expect_uvs(R"("offset":[0.25,0.5],"rotation":1.5707963,"scale":[2,3])", {0.25, 0.5}, {0.25, -1.5},
              {3.25, 0.5});
@@ -410,7 +410,7 @@ TEST(Mesh, ATextureInAnotherPlaceThanTheFirstIsTold) {
     EXPECT_NE(second.find(word), std::string::npos) << word << " in: " << second;
 }
 
-// placed_gltf with a map of normals in the same place, and normals and tangents of its own.
+// placed_gltf with a normal map of the same mapping, and with normals and tangents in the file.
 std::string gltf_with_tangents(const std::string& place, const Vector3f& tangent) {
   std::string text = placed_gltf(place, R"("normalTexture":{"index":1,)" + place + "},");
   std::vector<float> data;
@@ -430,7 +430,7 @@ std::string gltf_with_tangents(const std::string& place, const Vector3f& tangent
   return text;
 }
 
-// The normals of an image follow it where a transform turns it.
+// The directions in a normal map rotate together with the image.
 TEST(Mesh, TangentsOfTheFileGoWhereATransformTurnsTheTexture) {
   written("turned/paint.png", small_png());
   const auto tangent = [&](const std::string& how) {
@@ -444,7 +444,7 @@ TEST(Mesh, TangentsOfTheFileGoWhereATransformTurnsTheTexture) {
   EXPECT_TRUE(test::near(tangent(R"("scale":[-1,1])"), Vector3d(-1, 0, 0), 1e-5));
 }
 
-// Two squares side by side, the right one's uvs mirrored; both share the corners between them.
+// Two adjacent squares that share two corners; the uvs of the right one are mirrored.
 Mesh mirrored_squares() {
   Mesh mesh;
   for (const float y : {0.f, 1.f})
@@ -467,7 +467,8 @@ void expect_tangents_along_uvs(const Mesh& mesh) {
       const Vector3f t = tangent.head<3>(), b = tangent.w() * mesh.normals[corner].cross(t);
       EXPECT_NEAR(t.norm(), 1, 1e-5);
       EXPECT_NEAR(t.dot(mesh.normals[corner]), 0, 1e-5);
-      for (const std::uint32_t other : triangle) {  // in a plane uvs change along tangent and bitangent alone
+      for (const std::uint32_t other :
+           triangle) {  // in a plane, uvs change only along the tangent and the bitangent
         const Vector3f step = mesh.positions[other] - p;
         const Eigen::Vector2f uv = mesh.uvs[other] - mesh.uvs[triangle[0]];
         EXPECT_NEAR(step.dot(t), uv.x() * std::hypot(0.2f, 0.3f), 1e-5);
@@ -480,14 +481,14 @@ void expect_tangents_along_uvs(const Mesh& mesh) {
 TEST(Mesh, TangentsFollowTheUvsAlsoWhereTheseAreMirrored) {
   Mesh mesh = mirrored_squares();
   add_tangents(&mesh);
-  EXPECT_EQ(mesh.positions.size(), 8u);  // the two corners between the squares have two
+  EXPECT_EQ(mesh.positions.size(), 8u);  // the two shared corners have two vertices each
   expect_tangents_along_uvs(mesh);
 }
 
 TEST(Mesh, TangentsOfTheFileAreKept) {
   Mesh mesh = mirrored_squares();
   std::vector<Eigen::Vector4f> own(12, Eigen::Vector4f(0, 1, 0, -1));
-  own[4].setZero();  // one that the file lacks
+  own[4].setZero();  // a tangent that is missing in the file
   add_tangents(&mesh, own);
   int kept = 0, made = 0;
   for (const auto& triangle : mesh.triangles)
@@ -513,7 +514,7 @@ TEST(Mesh, ObjAndPlyLoadWithNormalsMade) {
   EXPECT_NEAR(ply->normals[3].z(), 1, 1e-6);
 }
 
-// Two triangles over three vertices; the second one's last index is `last`.
+// Two triangles with three vertices; the last index of the second one is `last`.
 std::string indexed_gltf(std::uint16_t last) {
   const float corners[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   const std::uint16_t indices[] = {0, 1, 2, 2, 1, last};
@@ -578,18 +579,18 @@ TEST(Nearest, AgreesWithASearchOverSamplesOfACube) {
     const Vector3d p(u(rng), u(rng), u(rng));
     const MeshPoint found = nearest_on(*mesh, p);
     Vector3d expected = p.cwiseMax(-1).cwiseMin(1);
-    if (expected == p) {  // inside: onto the nearest side
+    if (expected == p) {  // a point inside the cube goes to the nearest side
       int axis = 0;
       p.cwiseAbs().maxCoeff(&axis);
       expected[axis] = p[axis] > 0 ? 1 : -1;
     }
     EXPECT_TRUE(test::near(found.p, expected, 1e-5));
     EXPECT_NEAR(found.distance, (expected - p).norm(), 1e-5);
-    EXPECT_NEAR(found.d_normal.dot(found.p), 1, 1e-5);  // of the cube's sides
+    EXPECT_NEAR(found.d_normal.dot(found.p), 1, 1e-5);  // normals of the cube's sides
   }
 }
 
-// Two meshes in their places come back as one in which the poses are applied, materials and textures kept.
+// Two meshes with poses are read back as one mesh with the poses applied and with materials and textures.
 TEST(Glb, PutsMeshesInTheirPlaces) {
   Mesh plain;
   plain.positions = {{0, 0, 0}, {0.1f, 0, 0}, {0, 0.1f, 0}};
@@ -613,7 +614,7 @@ TEST(Glb, PutsMeshesInTheirPlaces) {
   const std::string bytes = encode_glb(placed);
   EXPECT_EQ(bytes, encode_glb(placed));
   EXPECT_LT(bytes.size(),
-            encode_glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is in it once
+            encode_glb(std::vector{placed[0], placed[1]}).size() + 300);  // a mesh is written only once
 
   const auto loaded = load_mesh(written("placed.glb", bytes), "m");
   ASSERT_TRUE(loaded) << loaded.message();

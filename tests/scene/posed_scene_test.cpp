@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 using namespace test::literals;
 
-// A half cylinder of radius 0.5 along y, its outside towards -z.
+// Half of a cylinder of radius 0.5 along y, whose outside faces -z.
 Mesh half_cylinder() {
   Mesh mesh;
   constexpr int k_steps = 180;
@@ -80,15 +80,15 @@ TEST(Posed, LostPartIsAbsentAndAnExtrapolatedOneIsNot) {
 TEST(Posed, StickingPartIsLaidOntoTheSurfaceAndKeepsItsTurn) {
   Scene scene = two_slots(true);
   const Pose world_from_prototype(exp_rotation({0.3, 1.2, -0.4}), {0.5, -0.2, 2});
-  for (const double side : {1.0, -1.0}) {  // the mesh's normals outward, then inward
+  for (const double side : {1.0, -1.0}) {  // with outward normals, then with inward ones
     if (side < 0) {
       for (auto& n : scene.prototype->mesh.normals) n = -n;
     }
-    // On the cylinder 30 degrees round, turned by 0.7 about its normal.
+    // The true pose: on the cylinder at 30 degrees, rotated by 0.7 rad about the normal.
     const double a = M_PI / 6;
     const Eigen::AngleAxisd round(-a, Vector3d::UnitY()), turn(0.7, Vector3d::UnitZ());
     const Pose on_surface(Eigen::Quaterniond(round * turn), {0.5 * std::sin(a), 0.1, -0.5 * std::cos(a)});
-    // Measured: 8 mm off along the normal, tilted by 5 degrees about an axis in the surface.
+    // The measured pose: 8 mm off along the normal, tilted by 5 degrees about an axis in the surface.
     const Vector3d d_out = on_surface.rotation * -Vector3d::UnitZ();
     const Eigen::Quaterniond tilt = exp_rotation(on_surface.rotation * Vector3d(5.0_deg, 0, 0));
     const Pose measured(tilt * on_surface.rotation, on_surface.translation + 0.008 * d_out);

@@ -50,7 +50,7 @@ TEST(Ply, OtherProgramsFilesAreRead) {
           .ok());
   const auto read = load_ply(path);
   ASSERT_TRUE(read.ok()) << read.message();
-  EXPECT_EQ(read->triangles.size(), 2U);  // the square as a fan
+  EXPECT_EQ(read->triangles.size(), 2U);  // the square becomes a triangle fan
   EXPECT_EQ(read->normals[1], Eigen::Vector3f(0, 0, 1));
 }
 

@@ -150,7 +150,7 @@ TEST(Scene, SeveralViewersShareOneEye) {
   const auto both = viewer_of(*scene, posed(*scene, tracks), up);
   ASSERT_TRUE(both);
   const Eigen::Vector3d p_both = both->imager_from_world.inverse().translation;
-  EXPECT_GT((p_both - p_fixed).norm(), 0.028);  // nearer to the one of weight 2
+  EXPECT_GT((p_both - p_fixed).norm(), 0.028);  // nearer to the viewer of weight 2
   EXPECT_LT((p_both - cap.world_from_body.translation).norm(), 0.022);
   const auto alone = viewer_of(*scene, posed(*scene, std::span(tracks).first(1)), up);
   ASSERT_TRUE(alone);
@@ -165,7 +165,7 @@ TEST(Scene, GuestsTabletsMayBeViewers) {
   watched["viewer"] = {{{"fixed", fixed}}, {{"tablet", "Ann"}, {"weight", 3}}};
   const auto named = load_scene(folder_with(watched));
   ASSERT_TRUE(named) << named.message();
-  EXPECT_EQ(bodies(*named).size(), 3u);  // no marker is theirs
+  EXPECT_EQ(bodies(*named).size(), 3u);  // tablets have no marker
   ASSERT_TRUE(named->find_tablet("Ann"));
   EXPECT_EQ(named->find_tablet("Ann")->weight, 3);
   EXPECT_FALSE(named->find_tablet("Ben"));
@@ -259,7 +259,7 @@ TEST(Scene, MissingAndTruncatedFilesAreErrors) {
   EXPECT_FALSE(load_scene(folder));
 }
 
-// A session begins with the parts that there are.
+// A session starts with the parts that can be loaded.
 TEST(Scene, PartsThatCannotBeLoadedAreLeftOutWhenThatIsAskedFor) {
   const fs::path door = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door",
                  folder = test::test_folder() / "door";

@@ -156,7 +156,7 @@ TEST(ShowState, ALookComesBackUntilItsMarkerIsMoved) {
   show_state = done(scene, show_state, saved, {"save_look", "", "first"});
   EXPECT_EQ(show_state.look, "first");
 
-  // The marker goes elsewhere, another variant is chosen, the prototype is moved; then the look comes back.
+  // The marker is moved, another variant is chosen, the prototype is moved; then the look is restored.
   show_state = done(scene, show_state, saved, {"choose_variant", "mirror", "c"});
   show_state = done(scene, show_state, saved, {"release", "mirror", ""});
   const Pose elsewhere(exp_rotation({0, 0, 1}), {-0.2, 0.1, 0});
@@ -176,7 +176,7 @@ TEST(ShowState, ALookComesBackUntilItsMarkerIsMoved) {
   far.translation.x() += 0.012;
   EXPECT_TRUE(
       test::pose_near(restored(far).world_from_part, k_world_from_prototype * far, 1e-6_deg, 1e-6_mm));
-  // A part whose marker is out of sight stands where its look had it.
+  // A part whose marker is not seen has the pose that its look has.
   show_state = done(scene, show_state, saved, {"restore_look", "", "first"});
   const std::vector<Track> alone = {track_of("prototype", k_world_from_prototype)};
   show_state = without_moved_pins(scene, show_state, alone);
@@ -218,12 +218,12 @@ TEST(ShowState, APartIsCarriedByTheMarkerThatItIsPairedWith) {
   const ShowState paired = done(scene, at_first, {}, {"pair", "mirror", nine.text()});
   EXPECT_TRUE(test::pose_near(place(paired, "mirror"), elsewhere, 1e-9_deg, 1e-6_mm));
   EXPECT_EQ(place(paired, "trim").translation.x(), 9);
-  // Its own is free for another; then it cannot have it back.
+  // The slot's own marker can now carry another slot; after that the slot cannot get it back.
   ShowState both = done(scene, paired, {}, {"pair", "trim", "aruco_4x4_50:0"});
   EXPECT_TRUE(test::pose_near(place(both, "trim"), own, 1e-9_deg, 1e-6_mm));
   EXPECT_TRUE(test::pose_near(place(both, "mirror"), elsewhere, 1e-9_deg, 1e-6_mm));
   EXPECT_FALSE(apply_edit(scene, both, {}, {"unpair", "mirror", ""}));
-  // Two slots that have changed their markers come back from the file, too.
+  // Two slots that have exchanged their markers are read from the file, too.
   both = done(scene, both, {}, {"pair", "mirror", "aruco_4x4_50:1"});
   const auto file = test::test_folder() / "pairings.json";
   ASSERT_TRUE(write_file(file, pairings_json(scene, both)));
@@ -293,7 +293,7 @@ TEST(ShowState, ALookHoldsMaterialsAndLight) {
   const ShowState plain = done(scene, again, posed, {"flip", "", ""});
   EXPECT_TRUE(shown(plain).parts[0].material.is_none());
   EXPECT_FALSE(shown(plain).light);
-  // The parts of a look that is split off have theirs.
+  // The look on the left of a split has its own materials.
   const auto left = left_of_split(scene, done(scene, plain, posed, {"split", "", "on"}));
   ASSERT_TRUE(left);
   EXPECT_EQ(shown(*left).parts[0].material, red);
@@ -321,11 +321,11 @@ TEST(ShowState, ALookHoldsMaterialsAndLight) {
   }
 }
 
-// The lamp is told as seen by somebody in front; the scene's own light says which way is up, if there is one.
+// The lamp's direction is relative to somebody in front; the scene's light defines up if there is one.
 TEST(ShowState, LightComesFromWhereItIsSaid) {
   Scene scene = two_slots();
   ShowState show_state = initial_show_state(scene);
-  show_state.d_up_world = {0, -1, 0};  // camera 0 is the world
+  show_state.d_up_world = {0, -1, 0};  // the world frame is camera 0's
   show_state.d_front_world = {0, 0, -1};
   const auto lit = [&](const std::string& value) {
     return *done(scene, show_state, {}, {"light", "", value}).light;
@@ -339,12 +339,12 @@ TEST(ShowState, LightComesFromWhereItIsSaid) {
   EXPECT_EQ(right.d_up_world, show_state.d_up_world);
   const double half = std::sqrt(0.5);
   EXPECT_NEAR((lit("0 45 1 0 0").lamps[0].d_world - Eigen::Vector3d(0, -half, -half)).norm(), 0, 1e-9);
-  // Looking down by 30 degrees does not lower what is level.
+  // Horizontal directions stay horizontal although the front direction points down by 30 degrees.
   const double c = std::cos(30_deg), s = std::sin(30_deg);
   scene.light = RoomLight{};
   scene.light->d_up_world = {0, -c, s};
   EXPECT_NEAR((lit("0 0 1 0 0").lamps[0].d_world - Eigen::Vector3d(0, -s, -c)).norm(), 0, 1e-9);
-  // A look keeps the scene's own light, too.
+  // A look saves the scene's own light, too.
   show_state = done(scene, show_state, {}, {"save_look", "", "own"});
   EXPECT_EQ(show_state.looks[0].light, scene.light);
 }
@@ -359,7 +359,7 @@ TEST(ShowState, BringsBackTheLookThatWasDeleted) {
   ASSERT_EQ(again.looks.size(), 1u);
   EXPECT_EQ(look_json(again.looks[0]), text);
   EXPECT_FALSE(apply_edit(scene, again, {}, {"undelete_look", "", ""}));
-  show_state = done(scene, show_state, {}, {"save_look", "", "A"});  // another of that name
+  show_state = done(scene, show_state, {}, {"save_look", "", "A"});  // replaces the look of that name
   EXPECT_FALSE(apply_edit(scene, show_state, {}, {"undelete_look", "", ""}));
 }
 

@@ -1,4 +1,4 @@
-// A part that sticks to the surface, carried by one small marker: how far off along the surface.
+// The position error along the surface of a part with stick_to_surface that one small marker carries.
 
 #include <cstdio>
 
@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 constexpr double k_depth = 1.6;
 constexpr double k_noise_px = 0.06;  // gives the 2.5 mm of depth noise of docs/measurements.md
 
-// A strip of the surface with that curvature (1/m; 0: flat) about the y axis, facing -z, its middle in the
+// A strip of surface with this curvature (1/m; 0: flat) about the y axis, facing -z, with its middle in the
 // origin.
 Mesh strip(double curvature) {
   Mesh mesh;
@@ -52,11 +52,11 @@ Scene scene_on(const Mesh& mesh) {
 
 struct Sideways {
   double depth_mm = 0, nearest_mm = 0, likeliest_mm = 0;
-  double turn_deg = 0;  // of the part, worst
+  double turn_deg = 0;  // largest rotation error of the part
 };
 
-// RMS over many images of a lone 40 mm marker, on a surface that is turned by `off_axis` from the line of
-// sight.
+// RMS errors over many images of a single 40 mm marker on a surface that is rotated by `off_axis` from the
+// viewing direction.
 Sideways measured(const Mesh& mesh, double off_axis, std::mt19937_64& rng) {
   const Imager camera = test::camera_1080p();
   const Scene scene = scene_on(mesh);
@@ -104,7 +104,7 @@ TEST(Snap, LoneMarkersDepthNoiseNoLongerMovesItAlongTheSurface) {
 }
 
 TEST(Snap, PrototypesOwnUncertaintyCounts) {
-  // The prototype's depth is uncertain, the marker's is not: again the place slides along the line of sight.
+  // The prototype's depth is uncertain, the marker's is not: again the position moves along the viewing ray.
   const Mesh mesh = strip(0);
   const Scene scene = scene_on(mesh);
   Track prototype, marker;
@@ -117,8 +117,8 @@ TEST(Snap, PrototypesOwnUncertaintyCounts) {
   const Track tracks[] = {prototype, marker};
   const Pose found = prototype.world_from_body.inverse() * posed(scene, tracks).parts.at(0).world_from_part;
   EXPECT_TRUE(test::near(found.translation, Vector3d(0, 0, 0), 0.01_mm));
-  // A prototype whose turn about a far origin is uncertain leaves the marker's place uncertain across the
-  // lever.
+  // If the prototype's rotation about a distant origin is uncertain, the marker's position is uncertain
+  // across the line between them.
   prototype.covariance.setZero();
   prototype.world_from_body.translation = Vector3d(0.5, 0, 1);
   prototype.covariance(1, 1) = 1e-4;  // about y

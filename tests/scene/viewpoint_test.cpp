@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 const Vector3d k_middle(0.1, 0.2, 0.3);
 
-// An eye seen from the middle: distance, turn around z, angle off z.
+// A viewpoint in polar coordinates around the middle: distance, rotation about z, angle from z.
 Viewpoint eye_at(const std::string& viewer, double distance, double turn_deg, double off_deg) {
   const double turn = turn_deg * M_PI / 180, off = off_deg * M_PI / 180;
   return {viewer, k_middle + distance * Vector3d(std::sin(off) * std::cos(turn),
@@ -36,7 +36,7 @@ TEST(SharedViewpoint, OfOnePersonIsThatEye) {
 TEST(SharedViewpoint, OfPeopleOnOneSideMisplacesPartsLeastInTheMeanSquare) {
   const std::vector<Viewpoint> viewpoints = {eye_at("a", 0.8, 0, 15), eye_at("b", 1.3, 100, 15),
                                              eye_at("c", 2, 220, 15)};
-  // Light on the plane through the middle for a point 2 mm over it.
+  // The position of the light on the plane through the middle for a point 2 mm above it.
   const auto error = [&](const Vector3d& p_eye) {
     const auto light = [](const Vector3d& p_from) {
       const Vector3d p = k_middle + Vector3d(0.03, -0.02, 0.002), d = p - p_from;
@@ -51,7 +51,7 @@ TEST(SharedViewpoint, OfPeopleOnOneSideMisplacesPartsLeastInTheMeanSquare) {
     for (const double step : {-0.02, 0.02})
       EXPECT_LT(error(p_best), error(p_best + step * Vector3d::Unit(axis))) << axis << " " << step;
   EXPECT_GT((p_best - (viewpoints[0].p_world + viewpoints[1].p_world + viewpoints[2].p_world) / 3).norm(),
-            0.1);  // no plain mean
+            0.1);  // different from the unweighted mean
 }
 
 TEST(SharedViewpoint, StaysWithItsLeaderWhenAnotherOnTheOtherSideIsAboutAsNear) {
@@ -66,7 +66,7 @@ TEST(SharedViewpoint, StaysWithItsLeaderWhenAnotherOnTheOtherSideIsAboutAsNear) 
     ASSERT_EQ(eye.leader, "a");
     ASSERT_TRUE(test::near(*eye.p_world(), viewpoints[0].p_world, 1e-9));
   }
-  // One who comes much nearer takes over, slowly.
+  // A viewer who comes much nearer takes over, slowly.
   const std::vector<Viewpoint> viewpoints = {eye_at("a", 1, 0, 60), eye_at("b", 0.6, 180, 60)};
   for (int frame = 0; frame < 24; ++frame) eye = updated_viewpoint(eye, viewpoints, k_middle, 1 / 60.0);
   EXPECT_EQ(eye.leader, "b");
@@ -87,7 +87,7 @@ TEST(SharedViewpoint, WaitsWhereItWasWhileNobodyIsSeen) {
   EXPECT_EQ(eye.shares.size(), 1u);
 }
 
-// People walk about a table at 1.5 m/s or less, come, go and are lost from sight at random.
+// People walk around a table at 1.5 m/s or less; they come, go and are not seen at random times.
 TEST(SharedViewpoint, NeverMovesFasterThanPeopleWalkAndTheImageFades) {
   auto rng = test::test_rng();
   std::normal_distribution<double> noise(0, 1);

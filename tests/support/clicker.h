@@ -10,7 +10,7 @@
 
 namespace limn::test {
 
-/// An input device: a pipe with the events that Linux would write.
+/// A simulated input device: a pipe with the events that Linux would write.
 class Clicker {
  public:
   explicit Clicker(const std::filesystem::path& path) {

@@ -23,27 +23,27 @@ constexpr double operator""_mm(long double v) { return static_cast<double>(v) * 
 constexpr double operator""_mm(unsigned long long v) { return static_cast<double>(v) * 1e-3; }
 }  // namespace literals
 
-/// EXPECT_TRUE(pose_near(found, expected, 0.1_deg, 0.5_mm)): says which of angle and distance broke, and by
-/// how much. Compares the rotation's angle itself. NaN fails.
+/// Usage: EXPECT_TRUE(pose_near(found, expected, 0.1_deg, 0.5_mm)). On failure it says by how much the angle
+/// and the distance are off. It compares the rotation's angle itself. NaN fails.
 testing::AssertionResult pose_near(const Pose& found, const Pose& expected, double angle, double distance);
 
-/// Distance of two points of any dimension; NaN fails.
+/// Compares the distance of two points of any dimension; NaN fails.
 testing::AssertionResult near(const Eigen::VectorXd& found, const Eigen::VectorXd& expected, double distance);
 
-/// Mean absolute difference <= `mean` and largest <= `worst`, over channels, in levels (8-bit) or units
-/// (float). On failure writes NAME-actual.png, NAME-expected.png, NAME-difference.png (8x) under the test's
-/// output folder and names them. NaN or another size or type fails.
+/// Checks that the mean absolute difference is <= `mean` and the largest <= `worst`, over all channels, in
+/// levels (8-bit) or units (float). On failure it writes NAME-actual.png, NAME-expected.png and
+/// NAME-difference.png (8x) to the test's output folder and names them. NaN or another size or type fails.
 testing::AssertionResult image_near(
     const cv::Mat& actual, const cv::Mat& expected, double mean, double worst, const std::string& name);
 
-/// A generator seeded from the running test's name: the same numbers every run, others in every test.
+/// A random generator seeded from the running test's name: the same numbers in every run of a test.
 std::mt19937_64 test_rng();
 
-/// A fresh folder of the running test, removed and made anew at the call.
+/// An empty folder for the running test; each call deletes its content.
 std::filesystem::path test_folder();
 
 /// The folder of real photographs: $LIMN_REAL_DATA, else ../shared/data beside the checkout. They are not in
-/// the repository; docs/measurements.md says where they come from. Nullopt when absent: tests then
+/// the repository; docs/measurements.md says where they come from. Nullopt when absent: tests then call
 /// GTEST_SKIP() and name the folder.
 std::optional<std::filesystem::path> real_data(const std::string& inside);
 

@@ -6,8 +6,8 @@
 
 namespace limn::test {
 
-/// While it lives, files of this process cannot grow beyond so many bytes: write() fails half way, as on a
-/// full disk.
+/// While it exists, files of this process cannot grow beyond this number of bytes: write() fails in the
+/// middle, as on a full disk.
 class SmallDisk {
  public:
   explicit SmallDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
