@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "core/log.h"
+#include "core/worker_thread.h"
 #include "remote/own_addresses.h"
 
 namespace limn::apps {
@@ -27,11 +28,11 @@ using asio::ip::tcp;
 using Problem = beast::error_code;
 
 constexpr auto k_tick = std::chrono::milliseconds(25);
-constexpr auto k_closing = std::chrono::milliseconds(400);       // for goodbyes, at the end
-constexpr auto k_accept_again = std::chrono::milliseconds(100);  // without handles for more
-constexpr int k_nice = 5;                                        // the projectors' threads go first
-constexpr std::size_t k_piece = 16 * 1024;                       // of what is thrown away
-constexpr std::size_t k_longest_farewell = 32 * 1024 * 1024;     // bytes thrown away at most
+constexpr auto k_close_timeout = std::chrono::milliseconds(400);  // for last messages, when the server stops
+constexpr auto k_accept_retry = std::chrono::milliseconds(100);   // when no file handles are left
+constexpr int k_nice = 5;                                         // the projectors' threads have priority
+constexpr std::size_t k_chunk = 16 * 1024;               // bytes read at once while a connection is drained
+constexpr std::size_t k_max_drained = 32 * 1024 * 1024;  // bytes
 
 using PlainStream = beast::tcp_stream;
 using TlsStream = beast::ssl_stream<beast::tcp_stream>;
@@ -39,87 +40,88 @@ using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 template <class Stream>
 constexpr bool k_is_tls = std::is_same_v<Stream, TlsStream>;
 
-// Who is connected from where.
-class Seats {
+// Counts connections, by address, and grants or refuses new ones.
+class ConnectionSlots {
  public:
-  explicit Seats(const NetworkLimits& limits) : limits_(limits) {}
+  explicit ConnectionSlots(const NetworkLimits& limits) : limits_(limits) {}
 
-  enum class Kind { served, turned_away };
-  // Given back when it goes.
-  class Seat {
+  enum class Kind { served, rejected };
+  // One granted connection; its destructor gives the slot back.
+  class Slot {
    public:
-    Seat(Seats* seats, std::string address, Kind kind)
-        : seats_(seats), address_(std::move(address)), kind_(kind) {
-      seats_->count(address_, kind_, 1);
+    Slot(ConnectionSlots* slots, std::string address, Kind kind)
+        : slots_(slots), address_(std::move(address)), kind_(kind) {
+      slots_->count(address_, kind_, 1);
     }
-    Seat(const Seat&) = delete;
-    Seat& operator=(const Seat&) = delete;
-    ~Seat() { seats_->count(address_, kind_, -1); }
+    Slot(const Slot&) = delete;
+    Slot& operator=(const Slot&) = delete;
+    ~Slot() { slots_->count(address_, kind_, -1); }
     const std::string& address() const { return address_; }
     Kind kind() const { return kind_; }
 
    private:
-    Seats* seats_;
+    ConnectionSlots* slots_;
     std::string address_;
     Kind kind_;
   };
 
-  // Null: none is left, not even to be told so.
-  std::unique_ptr<Seat> seat(const std::string& address) {
-    const auto of_address = of_address_.find(address);
-    const bool is_greedy = of_address != of_address_.end() && !is_loopback(address) &&
-                           of_address->second >= static_cast<int>(limits_.of_one_address);
+  // Null: there is no slot left, not even for an answer that says so.
+  std::unique_ptr<Slot> acquire(const std::string& address) {
+    const auto at = per_address_.find(address);
+    const bool is_over_limit = at != per_address_.end() && !is_loopback(address) &&
+                               at->second >= static_cast<int>(limits_.per_address);
     const bool is_full = served_ >= static_cast<int>(limits_.connections);
-    if (!is_full && !is_greedy) return std::make_unique<Seat>(this, address, Kind::served);
-    if (turned_away_ >= static_cast<int>(limits_.turned_away)) return nullptr;
-    return std::make_unique<Seat>(this, address, Kind::turned_away);
+    if (!is_full && !is_over_limit) return std::make_unique<Slot>(this, address, Kind::served);
+    if (rejected_ >= static_cast<int>(limits_.rejected)) return nullptr;
+    return std::make_unique<Slot>(this, address, Kind::rejected);
   }
 
  private:
   void count(const std::string& address, Kind kind, int change) {
-    if (kind == Kind::turned_away) {
-      turned_away_ += change;
+    if (kind == Kind::rejected) {
+      rejected_ += change;
       return;
     }
     served_ += change;
-    if ((of_address_[address] += change) == 0) of_address_.erase(address);
+    if ((per_address_[address] += change) == 0) per_address_.erase(address);
   }
 
   NetworkLimits limits_;
-  int served_ = 0, turned_away_ = 0;
-  std::map<std::string, int> of_address_;
+  int served_ = 0, rejected_ = 0;
+  std::map<std::string, int> per_address_;
 };
 
-// What connections share.
-struct House {
+// What all connections share.
+struct SharedState {
   asio::io_context io{1};
   std::optional<asio::ssl::context> tls;
   NetworkLimits limits;
-  Reception* reception = nullptr;
+  HttpHandler* handler = nullptr;
   bool is_closing = false;
 
-  // Connections that wait for an answer: other threads get a number, so that a connection lives and ends on
-  // the network's thread alone.
+  // Connections that wait for an answer. Other threads hold only a number, so that a connection is used and
+  // destroyed on the network's thread alone.
   std::map<std::uint64_t, Answering> waiting;
   std::uint64_t last_waiting = 0;
 
-  Answering ticket_of(Answering answering) {
+  // The same function for any thread: it runs `answering` on the network's thread.
+  Answering answering_on_this_thread(Answering answering) {
     waiting.emplace(++last_waiting, std::move(answering));
-    return [this, ticket = last_waiting](HttpAnswer answer) {
-      asio::post(io, [this, ticket, answer = std::move(answer)]() mutable {
-        const auto found = waiting.extract(ticket);
+    return [this, number = last_waiting](HttpAnswer answer) {
+      asio::post(io, [this, number, answer = std::move(answer)]() mutable {
+        const auto found = waiting.extract(number);
         if (!found.empty()) found.mapped()(std::move(answer));
       });
     };
   }
 };
 
-// Closes a connection so that what was said last arrives: what still comes is read for a moment and thrown
-// away.
-class Farewell : public std::enable_shared_from_this<Farewell> {
+// Closes a connection so that the last answer arrives: what the other side still sends is read for a moment
+// and dropped. (A socket that is closed with unread bytes resets the connection.)
+class DrainedClose : public std::enable_shared_from_this<DrainedClose> {
  public:
-  Farewell(beast::tcp_stream stream, std::unique_ptr<Seats::Seat> seat)
-      : stream_(std::move(stream)), seat_(std::move(seat)) {}
+  DrainedClose(beast::tcp_stream stream, std::unique_ptr<ConnectionSlots::Slot> slot)
+      : stream_(std::move(stream)), slot_(std::move(slot)) {}
 
   void run(std::chrono::milliseconds time) {
     Problem ignored;
@@ -132,41 +134,43 @@ class Farewell : public std::enable_shared_from_this<Farewell> {
   void read() {
     stream_.async_read_some(asio::buffer(bytes_),
                             [self = shared_from_this()](Problem problem, std::size_t count) {
-                              self->thrown_away_ += count;
-                              if (!problem && self->thrown_away_ < k_longest_farewell) self->read();
+                              self->drained_ += count;
+                              if (!problem && self->drained_ < k_max_drained) self->read();
                             });
   }
 
   beast::tcp_stream stream_;
-  std::unique_ptr<Seats::Seat> seat_;
-  std::array<char, k_piece> bytes_{};
-  std::size_t thrown_away_ = 0;
+  std::unique_ptr<ConnectionSlots::Slot> slot_;
+  std::array<char, k_chunk> bytes_{};
+  std::size_t drained_ = 0;
 };
 
-// A guest's WebSocket. One message is written at a time; the Visitor's outbox holds what comes next.
+// A guest's WebSocket. One message is written at a time; the peer keeps what comes next.
 template <class Stream>
 class Socket : public std::enable_shared_from_this<Socket<Stream>> {
  public:
-  Socket(Stream stream, House* house, std::unique_ptr<Seats::Seat> seat, std::shared_ptr<WsClient> client)
+  Socket(Stream stream,
+         SharedState* shared,
+         std::unique_ptr<ConnectionSlots::Slot> slot,
+         std::shared_ptr<WebSocketPeer> peer)
       : socket_(std::move(stream)),
-        house_(house),
-        seat_(std::move(seat)),
-        visitor_(std::move(client)),
-        late_(house->io) {}
+        shared_(shared),
+        slot_(std::move(slot)),
+        peer_(std::move(peer)),
+        timeout_(shared->io) {}
 
   template <class Request>
   void run(const Request& request) {
     beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has its own limits
-    websocket::stream_base::timeout limits{house_->limits.read, house_->limits.silence, true};
+    websocket::stream_base::timeout limits{shared_->limits.read, shared_->limits.silence, true};
     socket_.set_option(limits);
     socket_.auto_fragment(false);
-    socket_.read_message_max(visitor_->longest_message());
+    socket_.read_message_max(peer_->longest_message());
     socket_.async_accept(request, [self = this->shared_from_this()](Problem problem) {
       if (problem) return;
-      self->visitor_->wake = [weak = self->weak_from_this()] {
+      self->peer_->open([weak = self->weak_from_this()] {
         if (const auto self = weak.lock()) self->write();
-      };
-      self->house_->reception->greet(self->visitor_);
+      });
       self->read();
     });
   }
@@ -175,29 +179,29 @@ class Socket : public std::enable_shared_from_this<Socket<Stream>> {
   void read() {
     socket_.async_read(buffer_, [self = this->shared_from_this()](Problem problem, std::size_t) {
       if (problem) return self->end();
-      self->hear();
+      self->receive();
       self->read();
     });
   }
 
-  void hear() {
+  void receive() {
     const auto bytes = buffer_.cdata();
     const auto* data = static_cast<const char*>(bytes.data());
     if (socket_.got_text())
-      house_->reception->hear_text(visitor_, {data, bytes.size()});
+      peer_->receive_text({data, bytes.size()});
     else
-      house_->reception->hear_bytes(visitor_, {reinterpret_cast<const std::uint8_t*>(data), bytes.size()});
+      peer_->receive_bytes({reinterpret_cast<const std::uint8_t*>(data), bytes.size()});
     buffer_.consume(bytes.size());
-    if (buffer_.capacity() > visitor_->longest_message()) buffer_.shrink_to_fit();
-    socket_.read_message_max(visitor_->longest_message());
+    if (buffer_.capacity() > peer_->longest_message()) buffer_.shrink_to_fit();
+    socket_.read_message_max(peer_->longest_message());
   }
 
   void write() {
     if (is_writing_) return;
-    auto next = visitor_->outbox.next();
-    if (!next && !visitor_->outbox.is_over()) return;
+    auto next = peer_->next_message();
+    if (!next && !peer_->is_over()) return;
     is_writing_ = true;
-    be_late();
+    start_write_timeout();
     if (!next) {
       const websocket::close_reason reason(websocket::close_code::normal);
       return socket_.async_close(reason, [self = this->shared_from_this()](Problem) { self->end(); });
@@ -207,16 +211,16 @@ class Socket : public std::enable_shared_from_this<Socket<Stream>> {
     socket_.async_write(asio::buffer(*outgoing_),
                         [self = this->shared_from_this()](Problem problem, std::size_t) {
                           self->is_writing_ = false;
-                          self->late_.cancel();
+                          self->timeout_.cancel();
                           if (problem) return self->end();
                           self->write();
                         });
   }
 
-  // Nobody reads: the connection is cut.
-  void be_late() {
-    late_.expires_after(house_->limits.write);
-    late_.async_wait([weak = this->weak_from_this()](Problem problem) {
+  // Cuts the connection when the other side does not read.
+  void start_write_timeout() {
+    timeout_.expires_after(shared_->limits.write);
+    timeout_.async_wait([weak = this->weak_from_this()](Problem problem) {
       const auto self = weak.lock();
       if (problem || !self) return;
       beast::get_lowest_layer(self->socket_).close();
@@ -224,16 +228,16 @@ class Socket : public std::enable_shared_from_this<Socket<Stream>> {
   }
 
   void end() {
-    late_.cancel();
-    house_->reception->gone(visitor_);
+    timeout_.cancel();
+    peer_->close();
     beast::get_lowest_layer(socket_).close();
   }
 
   websocket::stream<Stream> socket_;
-  House* house_;
-  std::unique_ptr<Seats::Seat> seat_;
-  std::shared_ptr<WsClient> visitor_;
-  asio::steady_timer late_;
+  SharedState* shared_;
+  std::unique_ptr<ConnectionSlots::Slot> slot_;
+  std::shared_ptr<WebSocketPeer> peer_;
+  asio::steady_timer timeout_;
   beast::flat_buffer buffer_;
   std::shared_ptr<const std::string> outgoing_;
   bool is_writing_ = false;
@@ -243,16 +247,16 @@ class Socket : public std::enable_shared_from_this<Socket<Stream>> {
 template <class Stream>
 class Connection : public std::enable_shared_from_this<Connection<Stream>> {
  public:
-  Connection(Stream stream, House* house, std::unique_ptr<Seats::Seat> seat)
+  Connection(Stream stream, SharedState* shared, std::unique_ptr<ConnectionSlots::Slot> slot)
       : stream_(std::move(stream)),
-        house_(house),
-        seat_(std::move(seat)),
-        buffer_(house->limits.header_bytes + k_piece),
-        late_(house->io) {}
+        shared_(shared),
+        slot_(std::move(slot)),
+        buffer_(shared->limits.header_bytes + k_chunk),
+        timeout_(shared->io) {}
 
   void run() {
     if constexpr (k_is_tls<Stream>) {
-      beast::get_lowest_layer(stream_).expires_after(house_->limits.read);
+      beast::get_lowest_layer(stream_).expires_after(shared_->limits.read);
       stream_.async_handshake(asio::ssl::stream_base::server,
                               [self = this->shared_from_this()](Problem problem) {
                                 if (!problem) self->begin();
@@ -264,20 +268,20 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
 
  private:
   void begin() {
-    if (seat_->kind() == Seats::Kind::turned_away)
+    if (slot_->kind() == ConnectionSlots::Kind::rejected)
       return write_last(refusal(503, "too many connections. Try again in a moment."));
     read();
   }
 
-  // A whole request within the time; whoever has begun one and is late is told so.
+  // Reads a whole request within the time limit. A client that is late within a request gets an answer.
   void read() {
     parser_.emplace();
-    parser_->header_limit(static_cast<std::uint32_t>(house_->limits.header_bytes));
-    parser_->body_limit(house_->limits.body_bytes);
+    parser_->header_limit(static_cast<std::uint32_t>(shared_->limits.header_bytes));
+    parser_->body_limit(shared_->limits.body_bytes);
     beast::get_lowest_layer(stream_).expires_never();
     is_late_ = false;
-    late_.expires_after(house_->limits.read);
-    late_.async_wait([weak = this->weak_from_this()](Problem problem) {
+    timeout_.expires_after(shared_->limits.read);
+    timeout_.async_wait([weak = this->weak_from_this()](Problem problem) {
       const auto self = weak.lock();
       if (problem || !self) return;
       self->is_late_ = true;
@@ -285,20 +289,20 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
     });
     http::async_read(stream_, buffer_, *parser_,
                      [self = this->shared_from_this()](Problem problem, std::size_t) {
-                       self->late_.cancel();
-                       problem ? self->refuse(problem) : self->take();
+                       self->timeout_.cancel();
+                       problem ? self->reject(problem) : self->handle_request();
                      });
   }
 
-  void refuse(Problem problem) {
+  void reject(Problem problem) {
     const bool has_begun = parser_->got_some();
     if (is_late_) return has_begun ? write_last(refusal(408, "expected a whole request sooner.")) : close();
     if (problem == http::error::body_limit)
       return write_last(
-          refusal(413, fmt::format("expected a body of at most {} bytes.", house_->limits.body_bytes)));
+          refusal(413, fmt::format("expected a body of at most {} bytes.", shared_->limits.body_bytes)));
     if (problem == http::error::header_limit || problem == http::error::buffer_overflow)
       return write_last(
-          refusal(431, fmt::format("expected headers of at most {} bytes.", house_->limits.header_bytes)));
+          refusal(431, fmt::format("expected headers of at most {} bytes.", shared_->limits.header_bytes)));
     if (problem.category() == http::make_error_code(http::error::bad_method).category() &&
         problem != http::error::end_of_stream && problem != http::error::partial_message)
       return write_last(refusal(400, "expected a request of HTTP 1.1."));
@@ -320,25 +324,26 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
     out.if_none_match = text_of(message[http::field::if_none_match]);
     out.is_upgrade = websocket::is_upgrade(message);
     out.body = message.body();
-    out.address = seat_->address();
+    out.address = slot_->address();
     return out;
   }
 
-  void take() {
+  void handle_request() {
     const HttpRequest asked = request();
     is_head_ = asked.method == "HEAD";
     keeps_alive_ = parser_->get().keep_alive();
     if (asked.is_upgrade) {
-      auto admitted = house_->reception->admit(asked);
-      if (auto* refused = std::get_if<HttpAnswer>(&admitted)) return write_last(std::move(*refused));
+      auto accepted = shared_->handler->accept_web_socket(asked);
+      if (auto* refused = std::get_if<HttpAnswer>(&accepted)) return write_last(std::move(*refused));
       const auto socket =
-          std::make_shared<Socket<Stream>>(std::move(stream_), house_, std::move(seat_),
-                                           std::move(std::get<std::shared_ptr<WsClient>>(admitted)));
+          std::make_shared<Socket<Stream>>(std::move(stream_), shared_, std::move(slot_),
+                                           std::move(std::get<std::shared_ptr<WebSocketPeer>>(accepted)));
       return socket->run(parser_->get());
     }
-    house_->reception->answer(asked, house_->ticket_of([self = this->shared_from_this()](HttpAnswer answer) {
-      self->write(std::move(answer), self->keeps_alive_);
-    }));
+    shared_->handler->handle_request(
+        asked, shared_->answering_on_this_thread([self = this->shared_from_this()](HttpAnswer answer) {
+          self->write(std::move(answer), self->keeps_alive_);
+        }));
   }
 
   void write_last(HttpAnswer answer) { write(std::move(answer), false); }
@@ -355,7 +360,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
     const bool has_length = answer.status != 304;
     if (has_length) response_->content_length(answer.body.size());
     if (!is_head_) response_->body() = std::move(answer.body);
-    beast::get_lowest_layer(stream_).expires_after(house_->limits.write);
+    beast::get_lowest_layer(stream_).expires_after(shared_->limits.write);
     http::async_write(stream_, *response_,
                       [self = this->shared_from_this(), keeps_alive](Problem problem, std::size_t) {
                         if (problem) return;
@@ -364,23 +369,23 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
   }
 
   void close() {
-    const auto farewell = [this] {
-      std::make_shared<Farewell>(std::move(beast::get_lowest_layer(stream_)), std::move(seat_))
-          ->run(house_->limits.farewell);
+    const auto drain = [this] {
+      std::make_shared<DrainedClose>(std::move(beast::get_lowest_layer(stream_)), std::move(slot_))
+          ->run(shared_->limits.drain);
     };
     if constexpr (k_is_tls<Stream>) {
-      beast::get_lowest_layer(stream_).expires_after(house_->limits.farewell);
-      stream_.async_shutdown([self = this->shared_from_this(), farewell](Problem) { farewell(); });
+      beast::get_lowest_layer(stream_).expires_after(shared_->limits.drain);
+      stream_.async_shutdown([self = this->shared_from_this(), drain](Problem) { drain(); });
     } else {
-      farewell();
+      drain();
     }
   }
 
   Stream stream_;
-  House* house_;
-  std::unique_ptr<Seats::Seat> seat_;
+  SharedState* shared_;
+  std::unique_ptr<ConnectionSlots::Slot> slot_;
   beast::flat_buffer buffer_;
-  asio::steady_timer late_;
+  asio::steady_timer timeout_;
   std::optional<http::request_parser<http::string_body>> parser_;
   std::optional<http::response<http::string_body>> response_;
   bool is_late_ = false, is_head_ = false, keeps_alive_ = false;
@@ -407,72 +412,72 @@ Result<asio::ssl::context> context_with(const Certificate& certificate) {
 
 struct Network::Impl {
   explicit Impl(const NetworkLimits& limits)
-      : seats(limits), acceptor(house.io), pause(house.io), ticker(house.io), closing(house.io) {
-    house.limits = limits;
+      : slots(limits), acceptor(shared.io), pause(shared.io), ticker(shared.io), closing(shared.io) {
+    shared.limits = limits;
   }
 
   void accept() {
     acceptor.async_accept([this](Problem problem, tcp::socket socket) {
-      if (house.is_closing) return;
-      if (!problem) greet(std::move(socket));
+      if (shared.is_closing) return;
+      if (!problem) serve_connection(std::move(socket));
       if (!problem) return accept();
-      pause.expires_after(k_accept_again);
+      pause.expires_after(k_accept_retry);
       pause.async_wait([this](Problem) { accept(); });
     });
   }
 
-  void greet(tcp::socket socket) {
+  void serve_connection(tcp::socket socket) {
     Problem problem;
     const auto endpoint = socket.remote_endpoint(problem);
     if (problem) return;
-    auto seat = seats.seat(text_of(endpoint.address()));
-    if (!seat) return;
+    auto slot = slots.acquire(text_of(endpoint.address()));
+    if (!slot) return;
     socket.set_option(tcp::no_delay(true), problem);
     beast::tcp_stream stream(std::move(socket));
-    if (house.tls)
-      std::make_shared<Connection<TlsStream>>(TlsStream(std::move(stream), *house.tls), &house,
-                                              std::move(seat))
+    if (shared.tls)
+      std::make_shared<Connection<TlsStream>>(TlsStream(std::move(stream), *shared.tls), &shared,
+                                              std::move(slot))
           ->run();
     else
-      std::make_shared<Connection<PlainStream>>(std::move(stream), &house, std::move(seat))->run();
+      std::make_shared<Connection<PlainStream>>(std::move(stream), &shared, std::move(slot))->run();
   }
 
-  void tick() {
+  void start_ticker() {
     ticker.expires_after(k_tick);
     ticker.async_wait([this](Problem problem) {
-      if (problem || house.is_closing) return;
-      house.reception->tick(std::chrono::steady_clock::now());
-      tick();
+      if (problem || shared.is_closing) return;
+      shared.handler->update_at(std::chrono::steady_clock::now());
+      start_ticker();
     });
   }
 
   void run() try {
     step_back(k_nice);
-    house.io.run();
+    shared.io.run();
   } catch (const std::exception& bug) {
     log_warning("live: the remote stopped: this is a bug in Limn, please report it: {}", bug.what());
   }
 
   void close() {
-    house.is_closing = true;
+    shared.is_closing = true;
     Problem ignored;
     acceptor.close(ignored);
     ticker.cancel();
-    house.reception->close("the session has ended.");
-    closing.expires_after(k_closing);
-    closing.async_wait([this](Problem) { house.io.stop(); });
+    shared.handler->close_clients("the session has ended.");
+    closing.expires_after(k_close_timeout);
+    closing.async_wait([this](Problem) { shared.io.stop(); });
     await_empty();
   }
 
-  // Ends at once when nobody is left.
+  // Ends as soon as no client is left.
   void await_empty() {
-    if (house.reception->client_count() == 0) return house.io.stop();
+    if (shared.handler->client_count() == 0) return shared.io.stop();
     pause.expires_after(std::chrono::milliseconds(5));
     pause.async_wait([this](Problem) { await_empty(); });
   }
 
-  Seats seats;  // connections give back to it
-  House house;
+  ConnectionSlots slots;  // outlives the connections, which give their slots back
+  SharedState shared;
   tcp::acceptor acceptor;
   asio::steady_timer pause, ticker, closing;
   std::thread thread;
@@ -488,7 +493,7 @@ Result<std::unique_ptr<Network>> Network::open(const NetPlace& place,
   const auto address = asio::ip::make_address(place.host, problem);
   if (problem) return usage_error("expected a numeric address of this machine, found '{}'.", place.host);
   if (certificate) {
-    LIMN_TRY(impl->house.tls, context_with(*certificate));
+    LIMN_TRY(impl->shared.tls, context_with(*certificate));
   }
   const tcp::endpoint endpoint(address, static_cast<unsigned short>(std::stoi(place.port)));
   tcp::acceptor& acceptor = impl->acceptor;
@@ -509,14 +514,14 @@ int Network::port() const {
   return impl_->acceptor.local_endpoint(ignored).port();
 }
 
-void Network::start(Reception* reception) {
-  impl_->house.reception = reception;
+void Network::start(HttpHandler* handler) {
+  impl_->shared.handler = handler;
   impl_->accept();
-  impl_->tick();
+  impl_->start_ticker();
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
-void Network::post(std::function<void()> job) { asio::post(impl_->house.io, std::move(job)); }
+void Network::post(std::function<void()> job) { asio::post(impl_->shared.io, std::move(job)); }
 
 Network::~Network() { stop(); }
 

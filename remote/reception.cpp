@@ -81,6 +81,28 @@ struct Reception::Route {
   void (Reception::*answer)(const Asked&, Answering);
 };
 
+// The network's side of one client.
+class Reception::Connection : public WebSocketPeer {
+ public:
+  Connection(Reception* reception, std::shared_ptr<WsClient> client)
+      : reception_(reception), client_(std::move(client)) {}
+
+  void open(std::function<void()> wake) override {
+    client_->wake = std::move(wake);
+    reception_->greet(client_);
+  }
+  void receive_text(std::string_view text) override { reception_->hear_text(client_, text); }
+  void receive_bytes(std::span<const std::uint8_t> bytes) override { reception_->hear_bytes(client_, bytes); }
+  void close() override { reception_->gone(client_); }
+  std::optional<Outgoing> next_message() override { return client_->outbox.next(); }
+  bool is_over() const override { return client_->outbox.is_over(); }
+  std::size_t longest_message() const override { return client_->longest_message(); }
+
+ private:
+  Reception* reception_;
+  std::shared_ptr<WsClient> client_;
+};
+
 const std::vector<Reception::Route>& Reception::routes() {
   static const std::vector<Route> all = {
       {"POST", "/api/leave", Role::look, &Reception::post_leave},
@@ -122,7 +144,7 @@ std::optional<AuthSessions::Guest> Reception::guest_of(const HttpRequest& reques
   return guests_.find(token, Clock::now());
 }
 
-void Reception::answer(const HttpRequest& request, Answering answering) {
+void Reception::handle_request(const HttpRequest& request, Answering answering) {
   if (auto refused = refuse(request)) return answering(std::move(*refused));
   const auto path = path_of(request.target);
   if (!path) return answering(refusal(k_bad, "expected a path that begins with '/'."));
@@ -305,7 +327,7 @@ void Reception::post_leave(const Asked& asked, Answering answering) {
   HttpAnswer out = json_answer("{}");
   out.headers.emplace_back("Set-Cookie", setup_.cookie + "=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0");
   answering(std::move(out));
-  tick(Clock::now());
+  update_at(Clock::now());
 }
 
 std::optional<HttpAnswer> Reception::wish(const AuthSessions::Guest& guest,
@@ -364,6 +386,13 @@ std::variant<std::shared_ptr<WsClient>, HttpAnswer> Reception::admit(const HttpR
   auto client = std::make_shared<WsClient>();
   client->guest = *guest;
   return client;
+}
+
+std::variant<std::shared_ptr<WebSocketPeer>, HttpAnswer> Reception::accept_web_socket(
+    const HttpRequest& request) {
+  auto admitted = admit(request);
+  if (auto* refused = std::get_if<HttpAnswer>(&admitted)) return std::move(*refused);
+  return std::make_shared<Connection>(this, std::get<std::shared_ptr<WsClient>>(std::move(admitted)));
 }
 
 void Reception::greet(const std::shared_ptr<WsClient>& client) {
@@ -619,7 +648,7 @@ void Reception::publish() {
   }
 }
 
-void Reception::tick(Clock::time_point now) {
+void Reception::update_at(Clock::time_point now) {
   setup_.watched(guests_.count() > 0);
   for (const auto& client : visitors_) {
     if (guests_.lives(client->guest.number, now)) continue;
@@ -636,7 +665,7 @@ void Reception::tick(Clock::time_point now) {
   ask_for_room(now);
 }
 
-void Reception::close(const std::string& why) {
+void Reception::close_clients(const std::string& why) {
   for (const auto& client : visitors_) {
     client->outbox.end(why);
     client->wake();

@@ -14,6 +14,7 @@
 #include "core/worker_thread.h"
 #include "remote/auth_sessions.h"
 #include "remote/http.h"
+#include "remote/http_handler.h"
 #include "remote/image_provider.h"
 #include "remote/messages.h"
 #include "remote/state.h"
@@ -65,7 +66,7 @@ struct SessionNews {
 
 /// Where guests arrive: who may come in, what they may have, who is told what (docs/remote.md). Belongs to
 /// the thread of the network and knows nothing of it: requests go in, answers come out.
-class Reception {
+class Reception : public HttpHandler {
  public:
   using Clock = std::chrono::steady_clock;
   struct Setup {
@@ -86,8 +87,9 @@ class Reception {
 
   const AuthSessions& guests() const { return guests_; }
 
-  /// Answers once, maybe later, from any thread.
-  void answer(const HttpRequest& request, Answering answering);
+  void handle_request(const HttpRequest& request, Answering answering) override;
+  std::variant<std::shared_ptr<WebSocketPeer>, HttpAnswer> accept_web_socket(
+      const HttpRequest& request) override;
   /// For a request of /api/live: who comes in, or why not.
   std::variant<std::shared_ptr<WsClient>, HttpAnswer> admit(const HttpRequest& request);
   /// Once the visitor's `wake` is there.
@@ -101,13 +103,13 @@ class Reception {
 
   void take(SessionNews news);
   /// Some ten times a second: what time brings.
-  void tick(Clock::time_point now);
+  void update_at(Clock::time_point now) override;
   /// Says goodbye to all.
-  void close(const std::string& why);
+  void close_clients(const std::string& why) override;
   /// When that thread is no more: lets go of the eyes, which answer for the last time.
   void blind() { setup_.providers = {}; }
 
-  std::size_t client_count() const { return visitors_.size(); }
+  std::size_t client_count() const override { return visitors_.size(); }
 
  private:
   struct Asked {
@@ -117,6 +119,7 @@ class Reception {
     std::string etag;
   };
   struct Route;
+  class Connection;
   static const std::vector<Route>& routes();
   std::optional<HttpAnswer> refuse(const HttpRequest& request) const;
   std::optional<AuthSessions::Guest> guest_of(const HttpRequest& request) const;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "remote/auth_sessions.h"
+#include "remote/http_handler.h"
 #include "remote/messages.h"
 
 namespace limn::apps {
@@ -18,12 +19,6 @@ namespace limn::apps {
 constexpr std::size_t k_most_answers = 512;
 /// Messages of a guest: so many a second, and so many at once.
 constexpr double k_messages_per_s = 120, k_messages_at_once = 240;
-
-/// Something for a WebSocket.
-struct Outgoing {
-  std::shared_ptr<const std::string> bytes;
-  bool is_text = true;
-};
 
 /// What waits to be written to a guest. Of what grows old only the newest is kept, so that a slow reader
 /// costs no memory and gets no old news.

@@ -36,7 +36,7 @@ class AReception : public testing::Test {
     request.host = "localhost";
     request.content_type = "application/json";
     request.body = json({{"pin", reception_.guests().pin(role)}, {"name", "Ann"}}).dump();
-    reception_.answer(request, [&](const HttpAnswer& paired) {
+    reception_.handle_request(request, [&](const HttpAnswer& paired) {
       request.authorization = "Bearer " + json::parse(paired.body)["token"].get<std::string>();
     });
     request.target = "/api/live";
@@ -49,7 +49,7 @@ class AReception : public testing::Test {
   void rest_to_the_end() {
     for (const auto begun = Clock::now(); asked_.empty() && Clock::now() - begun < 20s;) {
       std::this_thread::sleep_for(20ms);
-      reception_.tick(Clock::now());
+      reception_.update_at(Clock::now());
     }
   }
 
