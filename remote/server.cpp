@@ -4,7 +4,7 @@
 
 #include "core/log.h"
 #include "core/user_folder.h"
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 
 namespace limn::apps {
 namespace {

@@ -14,10 +14,10 @@
 
 #include "core/result.h"
 #include "core/worker_thread.h"
-#include "remote/image_provider.h"
-#include "remote/network.h"
+#include "remote/api/reception.h"
+#include "remote/http/network.h"
 #include "remote/projected_code.h"
-#include "remote/reception.h"
+#include "remote/tablet/image_providers.h"
 #include "session/device_health.h"
 #include "session/remote_link.h"
 #include "session/session.h"

@@ -2,8 +2,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "remote/http.h"
-#include "remote/messages.h"
+#include "remote/api/messages.h"
+#include "remote/http/http.h"
 #include "tests/fuzz/fuzz_file.h"
 
 namespace limn::apps {

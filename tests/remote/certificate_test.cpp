@@ -1,5 +1,5 @@
 // The remote's certificate and its authority, judged as a device does that trusts the authority alone.
-#include "remote/certificate.h"
+#include "remote/http/certificate.h"
 
 #include <gtest/gtest.h>
 #include <openssl/pem.h>

@@ -1,5 +1,5 @@
 // Who is given which image of the room, and when, without a network and without a camera.
-#include "remote/reception.h"
+#include "remote/api/reception.h"
 
 #include <gtest/gtest.h>
 

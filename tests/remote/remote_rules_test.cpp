@@ -9,12 +9,12 @@
 
 #include "core/file.h"
 #include "gui/qr_code.h"
-#include "remote/auth_sessions.h"
-#include "remote/http.h"
-#include "remote/messages.h"
-#include "remote/own_addresses.h"
-#include "remote/static_files.h"
-#include "remote/ws_client.h"
+#include "remote/api/auth_sessions.h"
+#include "remote/api/messages.h"
+#include "remote/api/ws_client.h"
+#include "remote/http/http.h"
+#include "remote/http/own_addresses.h"
+#include "remote/http/static_files.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {

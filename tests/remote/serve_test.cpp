@@ -2,7 +2,7 @@
 // are tests/apps/remote_client.
 #include <sys/resource.h>
 
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 #include "tests/remote/a_server.h"
 
 namespace limn::apps {

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <variant>
 
-#include "remote/http.h"
+#include "remote/http/http.h"
 
 namespace limn::apps {
 

@@ -1,4 +1,4 @@
-#include "remote/static_files.h"
+#include "remote/http/static_files.h"
 
 #include <openssl/evp.h>
 

@@ -1,4 +1,4 @@
-#include "remote/messages.h"
+#include "remote/api/messages.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

@@ -12,15 +12,15 @@
 #include <vector>
 
 #include "core/worker_thread.h"
-#include "remote/auth_sessions.h"
-#include "remote/http.h"
-#include "remote/http_handler.h"
-#include "remote/image_provider.h"
-#include "remote/messages.h"
-#include "remote/state.h"
-#include "remote/static_files.h"
-#include "remote/thumbnails.h"
-#include "remote/ws_client.h"
+#include "remote/api/auth_sessions.h"
+#include "remote/api/messages.h"
+#include "remote/api/state.h"
+#include "remote/api/thumbnails.h"
+#include "remote/api/ws_client.h"
+#include "remote/http/http.h"
+#include "remote/http/http_handler.h"
+#include "remote/http/static_files.h"
+#include "remote/tablet/image_providers.h"
 #include "scene/comments.h"
 
 namespace limn::apps {

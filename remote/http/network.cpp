@@ -1,4 +1,4 @@
-#include "remote/network.h"
+#include "remote/http/network.h"
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
@@ -15,7 +15,7 @@
 
 #include "core/log.h"
 #include "core/worker_thread.h"
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 
 namespace limn::apps {
 namespace {

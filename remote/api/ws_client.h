@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "remote/auth_sessions.h"
-#include "remote/http_handler.h"
-#include "remote/messages.h"
+#include "remote/api/auth_sessions.h"
+#include "remote/api/messages.h"
+#include "remote/http/http_handler.h"
 
 namespace limn::apps {
 

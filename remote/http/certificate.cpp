@@ -1,4 +1,4 @@
-#include "remote/certificate.h"
+#include "remote/http/certificate.h"
 
 #include <arpa/inet.h>
 #include <openssl/bio.h>
@@ -20,7 +20,7 @@
 #include <optional>
 
 #include "core/file.h"
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 
 namespace limn::apps {
 namespace {

@@ -1,4 +1,4 @@
-#include "remote/ws_client.h"
+#include "remote/api/ws_client.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>

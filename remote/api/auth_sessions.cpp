@@ -1,4 +1,4 @@
-#include "remote/auth_sessions.h"
+#include "remote/api/auth_sessions.h"
 
 #include <arpa/inet.h>
 #include <openssl/crypto.h>

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/result.h"
-#include "remote/certificate.h"
-#include "remote/http_handler.h"
+#include "remote/http/certificate.h"
+#include "remote/http/http_handler.h"
 #include "session/udp_socket.h"
 
 namespace limn::apps {

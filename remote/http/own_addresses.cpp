@@ -1,4 +1,4 @@
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>

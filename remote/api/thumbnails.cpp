@@ -1,4 +1,4 @@
-#include "remote/thumbnails.h"
+#include "remote/api/thumbnails.h"
 
 #include <opencv2/imgcodecs.hpp>
 

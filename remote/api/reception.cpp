@@ -1,4 +1,4 @@
-#include "remote/reception.h"
+#include "remote/api/reception.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -6,7 +6,7 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "device/jpeg.h"
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 #include "scene/glb.h"
 
 namespace limn::apps {

@@ -1,4 +1,4 @@
-#include "remote/roles.h"
+#include "remote/api/roles.h"
 
 #include <nlohmann/json.hpp>
 

@@ -9,7 +9,7 @@
 #include <variant>
 #include <vector>
 
-#include "remote/roles.h"
+#include "remote/api/roles.h"
 
 namespace limn::apps {
 

@@ -1,4 +1,4 @@
-#include "remote/state.h"
+#include "remote/api/state.h"
 
 #include <algorithm>
 #include <cmath>
