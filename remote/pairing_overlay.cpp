@@ -8,7 +8,7 @@
 
 #include "gui/qr_code.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 constexpr auto k_font = cv::FONT_HERSHEY_SIMPLEX;
@@ -44,7 +44,7 @@ cv::Mat pairing_code_image(const std::string& text,
                            const std::string& pin,
                            const std::string& role,
                            int module_px) {
-  const cv::Mat code = qr_code(text);
+  const cv::Mat code = apps::qr_code(text);
   if (code.empty()) return {};
   cv::Mat large;
   cv::resize(code, large, {}, module_px, module_px, cv::INTER_NEAREST);
@@ -62,12 +62,12 @@ cv::Mat pin_image(const std::string& pin, const std::string& role, int width) {
   return sign.rowRange(0, write("Limn: " + role, k_fill / 2, next, &sign) + margin / 2).clone();
 }
 
-std::optional<OverlayPlace> overlay_place(const Imager& projector,
-                                          const Pose& world_from_prototype,
-                                          const cv::Mat& points,
-                                          const Eigen::Vector3d& d_up,
-                                          cv::Size shape,
-                                          double least_px) {
+std::optional<apps::OverlayPlace> overlay_place(const Imager& projector,
+                                                const Pose& world_from_prototype,
+                                                const cv::Mat& points,
+                                                const Eigen::Vector3d& d_up,
+                                                cv::Size shape,
+                                                double least_px) {
   const double aspect = 1.0 * shape.height / shape.width;
   const int step = std::max(1, std::min(points.cols, points.rows) / k_grid);
   struct Seat {
@@ -90,10 +90,10 @@ std::optional<OverlayPlace> overlay_place(const Imager& projector,
     }
   const auto place_at = [&](const Seat& seat, double width) {
     const Eigen::Vector3d d_right = width * seat.d_right, d_down = aspect * width * seat.d_down;
-    return OverlayPlace{seat.p - 0.5 * (d_right + d_down), d_right, d_down};
+    return apps::OverlayPlace{seat.p - 0.5 * (d_right + d_down), d_right, d_down};
   };
   // Whether the surface is there everywhere and flat, to a share of the width.
-  const auto is_free = [&](const OverlayPlace& place) {
+  const auto is_free = [&](const apps::OverlayPlace& place) {
     const double most = k_flat * place.d_right.norm();
     for (int i = 0; i <= k_nodes; ++i)
       for (int j = 0; j <= k_nodes; ++j) {
@@ -108,8 +108,8 @@ std::optional<OverlayPlace> overlay_place(const Imager& projector,
   };
   for (double px = points.cols; px >= least_px; px *= k_smaller)
     for (const Seat& seat : seats)
-      if (const OverlayPlace place = place_at(seat, px * seat.m_per_px); is_free(place)) return place;
+      if (const apps::OverlayPlace place = place_at(seat, px * seat.m_per_px); is_free(place)) return place;
   return std::nullopt;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,7 +6,7 @@
 
 #include "remote/pairing_overlay.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 constexpr double k_code_share = 0.5;  // of a projector's shorter side, without a prototype
@@ -19,10 +19,10 @@ constexpr double k_least_module_px = 2;  // of the projector's image, that a pho
 constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
 
 // Where the prototype is free of markers and, if there is room, of parts.
-std::optional<OverlayPlace> free_place(Session* session,
-                                       std::size_t projector,
-                                       cv::Size shape,
-                                       double least_px) {
+std::optional<apps::OverlayPlace> free_place(apps::Session* session,
+                                             std::size_t projector,
+                                             cv::Size shape,
+                                             double least_px) {
   cv::Mat points = session->free_surface(projector);
   if (points.empty() || shape.empty()) return std::nullopt;
   const Rig& rig = session->setup().rig;
@@ -61,7 +61,7 @@ void ProjectedCode::end() {
 }
 
 // It begins with a place for it; after a while without one, too: the prototype may not be seen.
-bool ProjectedCode::has_begun(Session* session, std::size_t projector) {
+bool ProjectedCode::has_begun(apps::Session* session, std::size_t projector) {
   if (until_) return true;
   const auto now = Clock::now();
   if (!asked_) {
@@ -82,7 +82,7 @@ bool ProjectedCode::has_begun(Session* session, std::size_t projector) {
   return true;
 }
 
-std::vector<Overlay> ProjectedCode::overlays(Session* session) {
+std::vector<apps::Overlay> ProjectedCode::overlays(apps::Session* session) {
   const std::vector<Imager>& projectors = session->setup().rig.projectors;
   const auto imager = std::find_if(projectors.begin(), projectors.end(),
                                    [&](const Imager& p) { return p.name == projector_; });
@@ -91,7 +91,7 @@ std::vector<Overlay> ProjectedCode::overlays(Session* session) {
   if (!has_begun(session, projector)) return {};
   if (Clock::now() >= *until_) end();
   if (sign_.empty()) return {};
-  SignOverlay overlay{projector, sign_, place_};
+  apps::SignOverlay overlay{projector, sign_, place_};
   if (!place_) {
     const int module_px = static_cast<int>(k_code_share * std::min(imager->width, imager->height) *
                                            k_code_module_px / sign_.cols);
@@ -102,4 +102,4 @@ std::vector<Overlay> ProjectedCode::overlays(Session* session) {
   return {overlay};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

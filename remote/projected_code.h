@@ -10,7 +10,7 @@
 #include "session/overlays.h"
 #include "session/session.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// A code for guests in a projector's light, for a while: its image, and a place for it on the prototype. The
 /// session's frame loop draws it; what guests and recordings get stays what was painted.
@@ -32,10 +32,10 @@ class ProjectedCode {
 
   /// The code on the largest flat and free piece of the prototype (in the image's middle, where there is
   /// none). Nothing under a blackout, and when it is over.
-  std::vector<Overlay> overlays(Session* session);
+  std::vector<apps::Overlay> overlays(apps::Session* session);
 
  private:
-  bool has_begun(Session* session, std::size_t projector);
+  bool has_begun(apps::Session* session, std::size_t projector);
   void end();
 
   std::chrono::milliseconds duration_{};
@@ -44,7 +44,7 @@ class ProjectedCode {
   std::function<void(Clock::time_point)> begun_;
   std::optional<Clock::time_point> asked_, searched_, until_;  // none before the first frame
   cv::Mat sign_;
-  std::optional<OverlayPlace> place_;  // on the prototype
+  std::optional<apps::OverlayPlace> place_;  // on the prototype
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,7 +6,7 @@
 #include "core/user_folder.h"
 #include "remote/http/own_addresses.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,7 +59,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   const auto named = [](const Error& problem) {
     return Error{fmt::format("--serve: {}", problem.message), problem.wrong_usage};
   };
-  const auto place = net_place(options.at, "127.0.0.1", true);
+  const auto place = apps::net_place(options.at, "127.0.0.1", true);
   if (!place) return named(place.error());
   auto files =
       StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);
@@ -100,7 +100,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
                       is_encrypted ? (*certificate)->fingerprint : "",
                       is_encrypted ? (*certificate)->authority_fingerprint : "",
                       out->reception_->guests().pins()};
-  const Invitation& told = out->invitation_;
+  const apps::Invitation& told = out->invitation_;
   log_info("live: the remote is at {}", told.url);
   if (is_encrypted) {
     log_info("live: its certificate's SHA-256 is {}", told.fingerprint);
@@ -130,7 +130,7 @@ std::optional<Wish> Server::next_wish() {
   return wish;
 }
 
-void Server::hear(Session* session, Stamp at) {
+void Server::hear(apps::Session* session, Stamp at) {
   const auto begun = Clock::now();
   std::map<std::string, std::optional<Eigen::Vector3d>> places;
   {
@@ -147,12 +147,12 @@ void Server::hear(Session* session, Stamp at) {
   }
 }
 
-void Server::hear(const SessionMoment& moment) {
+void Server::hear(const apps::SessionMoment& moment) {
   hear(&moment.session, moment.at);
   tell(moment.session, moment.telemetry, moment.health, moment.at);
 }
 
-std::vector<Overlay> Server::overlays(Session* session) { return code_.overlays(session); }
+std::vector<apps::Overlay> Server::overlays(apps::Session* session) { return code_.overlays(session); }
 
 void Server::show_code(const std::string& projector, Role role) {
   const std::string& pin = invitation_.pins[static_cast<std::size_t>(role)];
@@ -163,7 +163,10 @@ void Server::show_code(const std::string& projector, Role role) {
   log_info("live: {} shows the code of the remote for {}", projector, name_of(role));
 }
 
-void Server::tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at) {
+void Server::tell(const apps::Session& session,
+                  const apps::Telemetry& telemetry,
+                  const apps::DeviceHealth& health,
+                  Stamp at) {
   if (!begun_at_) begun_at_ = at;
   if (know_) know_(session);
   if (session.is_writing()) return;  // what people ask for as soon as they are told must be on the disk
@@ -198,4 +201,4 @@ void Server::tell(const Session& session, const Telemetry& telemetry, const Devi
   });
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -24,7 +24,7 @@
 #include "session/session_client.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 struct ServeOptions {
   std::string at;                 ///< PORT (of this machine alone) or ADDRESS:PORT; port 0: any free one
@@ -37,7 +37,7 @@ struct ServeOptions {
 
 /// The remote of a session (docs/remote.md): guests on its network. What SessionClient and RemoteLink have
 /// belongs to the session's thread and never waits; everything else happens on threads of the server's own.
-class Server : public SessionClient, public RemoteLink {
+class Server : public apps::SessionClient, public apps::RemoteLink {
  public:
   /// Tells on stderr where it is and the PINs. Errors name the option. `eyes` may be
   /// empty.
@@ -47,15 +47,18 @@ class Server : public SessionClient, public RemoteLink {
   /// Tells the session where guests' tablets look from. Does what guests want, at most k_most_at_once edits
   /// and for at most 5 ms; the others wait for the next call. What cannot be done is answered to who wanted
   /// it.
-  void hear(Session* session, Stamp at);
+  void hear(apps::Session* session, Stamp at);
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
-  void tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at);
+  void tell(const apps::Session& session,
+            const apps::Telemetry& telemetry,
+            const apps::DeviceHealth& health,
+            Stamp at);
 
   /// Both hear and tell: what came while a frame was made need not wait for the next one.
-  void hear(const SessionMoment& moment) override;
-  void tell(const SessionMoment& moment) override { hear(moment); }
-  std::vector<Overlay> overlays(Session* session) override;
+  void hear(const apps::SessionMoment& moment) override;
+  void tell(const apps::SessionMoment& moment) override { hear(moment); }
+  std::vector<apps::Overlay> overlays(apps::Session* session) override;
 
   /// From its next image on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
   /// no other one does then. Guests of lesser roles see no images of the room meanwhile, since its cameras
@@ -66,7 +69,7 @@ class Server : public SessionClient, public RemoteLink {
   /// Says goodbye to all, lets go of the eyes and ends the threads.
   void stop();
 
-  const Invitation& invitation() const override { return invitation_; }
+  const apps::Invitation& invitation() const override { return invitation_; }
   int port() const { return network_->port(); }
 
   static constexpr std::size_t k_most_at_once = 64;
@@ -76,7 +79,7 @@ class Server : public SessionClient, public RemoteLink {
   Server() = default;
   std::optional<Wish> next_wish();
 
-  Invitation invitation_;
+  apps::Invitation invitation_;
   WorkerThread worker_;
   std::unique_ptr<Reception> reception_;
   std::unique_ptr<Network> network_;
@@ -89,7 +92,7 @@ class Server : public SessionClient, public RemoteLink {
   bool is_news_posted_ = false;
 
   std::vector<Outcome> outcomes_;  // the session's alone, as the rest
-  std::function<void(const Session&)> know_;
+  std::function<void(const apps::Session&)> know_;
   std::shared_ptr<const scene::Scene> scene_;
   int scenes_ = 0;
   ProjectedCode code_;
@@ -98,4 +101,4 @@ class Server : public SessionClient, public RemoteLink {
   std::size_t told_edits_ = 0;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

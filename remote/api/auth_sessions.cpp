@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 constexpr std::uint32_t k_pins = 1000000;
@@ -153,4 +153,4 @@ void AuthSessions::leave(std::uint64_t guest) {
   std::erase_if(sessions_, [&](const Session& session) { return session.guest.number == guest; });
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -11,7 +11,7 @@
 
 #include "remote/api/roles.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// How many bytes of a token are random.
 constexpr std::size_t k_token_bytes = 32;
@@ -91,4 +91,4 @@ class AuthSessions {
   Tries of_all_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 using nlohmann::json;
@@ -267,4 +267,4 @@ std::string image_message(ImageKind kind,
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

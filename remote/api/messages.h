@@ -14,7 +14,7 @@
 #include "scene/actions.h"
 #include "scene/comments.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// The longest texts that are looked at, bytes; a remark's is scene::k_longest_comment.
 constexpr std::size_t k_longest_message = 16 * 1024, k_longest_word = 200, k_longest_guest_name = 64;
@@ -82,4 +82,4 @@ std::string image_message(ImageKind kind,
                           const std::string& json,
                           std::span<const std::uint8_t> jpeg);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -9,7 +9,7 @@
 #include "remote/http/own_addresses.h"
 #include "scene/glb.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 using nlohmann::ordered_json;
@@ -516,7 +516,7 @@ void Reception::hear_bytes(const std::shared_ptr<WsClient>& client, std::span<co
 bool Reception::is_eye(const std::shared_ptr<WsClient>& client, Clock::time_point now) const {
   const auto eye = guest_eyes_.find(client->guest.name);
   return eye == guest_eyes_.end() || eye->second.client.lock() == client ||
-         now - eye->second.at > std::chrono::duration<double>(k_guest_place_lasts_s);
+         now - eye->second.at > std::chrono::duration<double>(apps::k_guest_place_lasts_s);
 }
 
 void Reception::look(const std::shared_ptr<WsClient>& client, WsClient::Frame frame) {
@@ -672,4 +672,4 @@ void Reception::close_clients(const std::string& why) {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

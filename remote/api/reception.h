@@ -23,7 +23,7 @@
 #include "remote/tablet/image_providers.h"
 #include "scene/comments.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Edits that wait for the session at once; with one more they are refused.
 constexpr std::size_t k_most_wishes = 256;
@@ -204,4 +204,4 @@ class Reception : public HttpHandler {
   std::shared_ptr<Thumbnails> thumbnails_;                   // likewise
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 const char* name_of(scene::ArgumentKind argument_kind) {
@@ -44,4 +44,4 @@ std::string actions_json() {
   return all.dump();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -4,7 +4,7 @@
 
 #include "scene/actions.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 using scene::Role;
 
@@ -14,4 +14,4 @@ Role role_for(const std::string& action);
 /// The table of actions as GET /api/actions tells it: JSON.
 std::string actions_json();
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -8,7 +8,7 @@
 #include "core/config.h"
 #include "scene/command_text.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 constexpr double k_same_m = 0.05e-3, k_same_rad = 0.03 * std::numbers::pi / 180;
@@ -22,7 +22,7 @@ std::string sight_of(const std::vector<Track>& tracks, const std::string& body) 
   return "lost";
 }
 
-SessionState::Slot slot_of(const Session& session, std::size_t index) {
+SessionState::Slot slot_of(const apps::Session& session, std::size_t index) {
   const scene::Scene& scene = session.setup().scene;
   const scene::Slot& slot = scene.slots[index];
   const scene::ShowState::Slot& staged = session.show_state().slots[index];
@@ -73,9 +73,9 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
 
 }  // namespace
 
-SessionState state_of(const Session& session,
-                      const Telemetry& telemetry,
-                      const DeviceHealth& health,
+SessionState state_of(const apps::Session& session,
+                      const apps::Telemetry& telemetry,
+                      const apps::DeviceHealth& health,
                       Stamp begun_at) {
   const scene::Scene& scene = session.setup().scene;
   const scene::ShowState& show_state = session.show_state();
@@ -101,7 +101,7 @@ SessionState state_of(const Session& session,
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
-  for (const LooseMarker& loose : waiting_markers(scene, show_state, session.watched()))
+  for (const apps::LooseMarker& loose : apps::waiting_markers(scene, show_state, session.watched()))
     out.waiting.push_back(loose.marker.text());
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, begun_at);
@@ -150,7 +150,7 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["windows"] = state.windows;
   out["projectors"] = state.projectors;
   out["devices"] = nlohmann::ordered_json::array();
-  for (const DeviceState& device : state.devices)
+  for (const apps::DeviceState& device : state.devices)
     out["devices"].push_back(
         {{"name", device.name}, {"kind", device.kind}, {"works", device.works}, {"why", device.why}});
   out["waiting"] = state.waiting;
@@ -160,4 +160,4 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

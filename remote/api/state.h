@@ -11,7 +11,7 @@
 #include "session/session.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// What a guest of the remote is told of a session, but for who is there: "The state" of docs/remote.md.
 struct SessionState {
@@ -43,16 +43,16 @@ struct SessionState {
   std::vector<std::string> windows;  ///< of guests whose tablets can be
   std::string repair;                ///< how far it is; empty: there is none
   std::vector<std::string> projectors;
-  std::vector<DeviceState> devices;
+  std::vector<apps::DeviceState> devices;
   std::vector<std::string> waiting;
   std::vector<Note> notes;  ///< the newest last
-  std::optional<Edited> last_edit;
+  std::optional<apps::Edited> last_edit;
 };
 
 /// `begun_at`: of the session, from which notes are dated.
-SessionState state_of(const Session& session,
-                      const Telemetry& telemetry,
-                      const DeviceHealth& health,
+SessionState state_of(const apps::Session& session,
+                      const apps::Telemetry& telemetry,
+                      const apps::DeviceHealth& health,
                       Stamp begun_at);
 
 /// Poses that differ from `told` by what a tracker trembles (0.05 mm, 0.03 degrees) as they were told.
@@ -61,4 +61,4 @@ SessionState steadied(SessionState state, const SessionState& told);
 /// Its members of the message, but for number, last_edit, guests and comments.
 nlohmann::ordered_json to_json(const SessionState& state);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

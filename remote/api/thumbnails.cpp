@@ -5,7 +5,7 @@
 #include "device/gl_context.h"
 #include "session/thumbnail.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 constexpr int k_side_px = 320;
@@ -32,10 +32,10 @@ Status Thumbnails::draw(const scene::Scene& scene) {
   for (const scene::Slot& slot : scene.slots)
     for (const scene::Variant& variant : slot.variants) {
       std::vector<std::uint8_t> png;
-      cv::imencode(".png", draw_thumbnail(&renderer, scene, slot.name, variant.name, k_side_px), png);
+      cv::imencode(".png", apps::draw_thumbnail(&renderer, scene, slot.name, variant.name, k_side_px), png);
       images_[{slot.name, variant.name}] = std::make_shared<const std::string>(png.begin(), png.end());
     }
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

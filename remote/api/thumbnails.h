@@ -8,7 +8,7 @@
 #include "core/result.h"
 #include "scene/scene.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Each variant's image by itself, as PNG; drawn all at once when the first one of a scene is asked for, in
 /// a GL context that goes again. Belongs to one thread, which must have no context of its own.
@@ -26,4 +26,4 @@ class Thumbnails {
   std::map<std::pair<std::string, std::string>, std::shared_ptr<const std::string>> images_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

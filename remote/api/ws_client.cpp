@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-namespace limn::apps {
+namespace limn::remote {
 
 void Outbox::answer(std::string text) {
   answers_.push_back(std::move(text));
@@ -46,4 +46,4 @@ bool Pace::takes(Time now) {
   return true;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -13,7 +13,7 @@
 #include "remote/api/messages.h"
 #include "remote/http/http_handler.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Answers to messages that may wait for a guest who does not read; with one more the connection ends.
 constexpr std::size_t k_most_answers = 512;
@@ -79,4 +79,4 @@ struct WsClient {
   std::size_t longest_message() const { return device.empty() ? k_longest_message : k_longest_frame; }
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -22,7 +22,7 @@
 #include "core/file.h"
 #include "remote/http/own_addresses.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -275,4 +275,4 @@ Result<Certificate> certificate_in(const fs::path& folder, const std::vector<std
                      fingerprint_of(signer)};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// How long a certificate is good for, and when before its end another one is made. Phones take no more than
 /// 825 days.
@@ -31,4 +31,4 @@ struct Certificate {
 Result<Certificate> certificate_in(const std::filesystem::path& folder,
                                    const std::vector<std::string>& hosts);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

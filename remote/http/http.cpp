@@ -2,7 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
-namespace limn::apps {
+namespace limn::remote {
 
 HttpAnswer refusal(int status, const std::string& why) {
   const nlohmann::json body = {{"error", why}};
@@ -73,4 +73,4 @@ std::string host_in(std::string_view header) {
   return std::string(header.substr(0, header.find(':')));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// What is looked at of a request; absent headers are empty.
 struct HttpRequest {
@@ -46,4 +46,4 @@ std::string cookie_in(std::string_view header, std::string_view name);
 /// The host of a Host header, without port and brackets.
 std::string host_in(std::string_view header);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -12,7 +12,7 @@
 
 #include "remote/http/http.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// One message to write to a WebSocket.
 struct Outgoing {
@@ -60,4 +60,4 @@ class HttpHandler {
   virtual std::size_t client_count() const = 0;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -17,7 +17,7 @@
 #include "core/worker_thread.h"
 #include "remote/http/own_addresses.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace asio = boost::asio;
@@ -485,7 +485,7 @@ struct Network::Impl {
 
 Network::Network(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<Network>> Network::open(const NetPlace& place,
+Result<std::unique_ptr<Network>> Network::open(const apps::NetPlace& place,
                                                const std::optional<Certificate>& certificate,
                                                const NetworkLimits& limits) {
   auto impl = std::make_unique<Impl>(limits);
@@ -531,4 +531,4 @@ void Network::stop() {
   impl_->thread.join();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -11,7 +11,7 @@
 #include "remote/http/http_handler.h"
 #include "session/udp_socket.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// The limits of connections.
 struct NetworkLimits {
@@ -32,7 +32,7 @@ class Network {
  public:
   /// Binds the port. With a certificate only TLS is accepted. Errors: the address is not this machine's, or
   /// the port is in use. No request is answered before start().
-  static Result<std::unique_ptr<Network>> open(const NetPlace& place,
+  static Result<std::unique_ptr<Network>> open(const apps::NetPlace& place,
                                                const std::optional<Certificate>& certificate,
                                                const NetworkLimits& limits = {});
   ~Network();
@@ -52,4 +52,4 @@ class Network {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

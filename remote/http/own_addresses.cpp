@@ -9,7 +9,7 @@
 #include <array>
 #include <memory>
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 struct FreeInterfaces {
@@ -67,4 +67,4 @@ std::string own_name() {
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

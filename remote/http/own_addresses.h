@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Whether a numeric address is this machine's own, which nobody else can reach: 127.0.0.0/8 and ::1.
 bool is_loopback(const std::string& address);
@@ -15,4 +15,4 @@ std::vector<std::string> own_addresses();
 /// The machine's name; empty when it has none.
 std::string own_name();
 
-}  // namespace limn::apps
+}  // namespace limn::remote

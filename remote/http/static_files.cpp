@@ -6,7 +6,7 @@
 
 #include "core/file.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -70,4 +70,4 @@ const StaticFiles::File* StaticFiles::find(const std::string& path) const {
   return page == files_.end() ? nullptr : &page->second;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// The largest file of the page, bytes.
 constexpr std::size_t k_longest_file = 2 * 1024 * 1024;
@@ -32,4 +32,4 @@ class StaticFiles {
   std::map<std::string, File> files_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -8,7 +8,7 @@
 
 #include "remote/tablet/tablet_view.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Who draws images for guests: the live composite, and the window into a tablet's own images. They
 /// return at once and answer every call exactly once, on another thread, at the latest when these functions
@@ -16,7 +16,7 @@ namespace limn::apps {
 struct ImageProviders {
   using Seen = TabletView::Seen;
   using Answer = std::function<void(Seen)>;
-  std::function<void(const Session&)> know;  ///< at every image of the session, on its thread
+  std::function<void(const apps::Session&)> know;  ///< at every image of the session, on its thread
   std::function<void(const TabletView::Window&, std::vector<std::uint8_t> jpeg, Answer)> look;
   std::function<void(Answer)> room;
 };
@@ -25,10 +25,10 @@ struct ImageProviders {
 inline ImageProviders image_providers(std::unique_ptr<TabletView> tablet_view) {
   const std::shared_ptr<TabletView> shared = std::move(tablet_view);
   return {
-      [shared](const Session& session) { shared->know(session); },
+      [shared](const apps::Session& session) { shared->know(session); },
       [shared](const TabletView::Window& window, std::vector<std::uint8_t> jpeg,
                ImageProviders::Answer answer) { shared->look(window, std::move(jpeg), std::move(answer)); },
       [shared](ImageProviders::Answer answer) { shared->room(std::move(answer)); }};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

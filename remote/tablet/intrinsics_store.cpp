@@ -7,7 +7,7 @@
 #include "core/file.h"
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -93,4 +93,4 @@ Status save_lenses(const fs::path& folder,
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -7,7 +7,7 @@
 #include "calib/online_intrinsics.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Whether a name can be a device's: 8 to 64 letters, digits, `-`.
 bool is_device_name(const std::string& device);
@@ -23,4 +23,4 @@ Status save_lenses(const std::filesystem::path& folder,
                    const std::string& device,
                    const std::vector<calib::IntrinsicsEstimate>& lenses);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,7 +6,7 @@
 
 #include "device/jpeg.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 // Of a progressive image: encoders write about ten, and each costs a pass over all of the image.
@@ -40,4 +40,4 @@ Result<cv::Mat> decode_tablet_image(std::span<const std::uint8_t> jpeg) {
   return bgr;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 constexpr std::size_t k_most_guest_bytes = 4 << 20;
 constexpr int k_most_guest_side = 4096;  ///< px, of what is sent
@@ -18,4 +18,4 @@ constexpr int k_drawn_side = 1280;       ///< px: larger images are looked at an
 /// words: no JPEG, too large, damaged, or one that would take long to decode.
 Result<cv::Mat> decode_tablet_image(std::span<const std::uint8_t> jpeg);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -7,7 +7,7 @@
 #include "core/names.h"
 #include "tracker/marker_pose.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 constexpr int k_lens_side = 1280;                      // px, the longer side that lenses are kept at
@@ -282,4 +282,4 @@ void TabletLocalizer::note_kept() {
   for (Aspect& aspect : aspects_) aspect.kept_stddev_px = aspect.lens.estimate().focal_stddev_px();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

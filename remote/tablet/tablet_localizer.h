@@ -13,7 +13,7 @@
 #include "tracker/body_correspondences.h"
 #include "tracker/detector.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// Where a guest's camera was when it took an image.
 struct TabletPose {
@@ -71,4 +71,4 @@ class TabletLocalizer {
   std::vector<calib::BodyView> views_;  // of the last image, to learn from
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -32,7 +32,7 @@
 #include "session/stillness.h"
 #include "tracker/family.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 using Answer = std::function<void(TabletView::Seen)>;
@@ -53,7 +53,7 @@ struct Known {
   int scenes = 0;
   scene::ShowState show_state;
   std::vector<Track> tracks;  // at the moment of `room`
-  ComposeOptions paint;
+  apps::ComposeOptions paint;
   Frame room;
   std::string follows;  // the guest whom light shows `view` parts to
 };
@@ -71,7 +71,7 @@ std::vector<Body> bodies_of(const scene::Scene& scene, const scene::ShowState& s
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     const MarkerName& carrier = scene::slot_marker(scene, show_state, i);
-    const double size_m = carrier == slot.marker ? slot.size_m : loose_size_m(scene);
+    const double size_m = carrier == slot.marker ? slot.size_m : apps::loose_size_m(scene);
     out.push_back({slot.name, {{carrier, size_m, Pose()}}});
   }
   return out;
@@ -289,11 +289,11 @@ cv::Mat TabletView::Impl::drawn(const Imager& camera,
                                 Sides* shown) {
   const cv::Mat right = with_parts(camera, image, posed, known, parts, &shown->right);
   const auto left = scene::left_of_split(*known.scene, known.show_state);
-  const auto line =
-      left ? split_line(camera, posed, prototype_box, known.show_state.split_mm) : std::optional<cv::Vec3d>();
+  const auto line = left ? apps::split_line(camera, posed, prototype_box, known.show_state.split_mm)
+                         : std::optional<cv::Vec3d>();
   if (!line) return right;
   const scene::PosedScene other = scene::compose_scene(*known.scene, *left, tracks);
-  return split_along(*line, with_parts(camera, image, other, known, parts, &shown->left), right);
+  return apps::split_along(*line, with_parts(camera, image, other, known, parts, &shown->left), right);
 }
 
 // Parts over an image. As the room's screen treats them `view` parts that light shows to another eye than
@@ -343,7 +343,7 @@ TabletView::Seen TabletView::Impl::seen_by(const Guest& guest, const Known& know
 
   const Stamp tracking = std::chrono::steady_clock::now();
   std::vector<Track> tracks = tracks_of(known);
-  const Pose turned_from_world = steadied(&held, &tracks);
+  const Pose turned_from_world = apps::steadied(&held, &tracks);
   Watching& device = watching_of(guest.window.device);
   const TabletPose observation = device.eye.look(*image, bodies_of(*known.scene, known.show_state), tracks);
   const double track_ms = milliseconds_since(tracking);
@@ -399,7 +399,7 @@ TabletView::Seen TabletView::Impl::seen_in_room(const Known& known) {
     cv::resize(image, image, size, 0, 0, cv::INTER_AREA);
   }
   std::vector<Track> tracks = tracks_of(known);
-  camera.imager_from_world = camera.imager_from_world * steadied(&held, &tracks).inverse();
+  camera.imager_from_world = camera.imager_from_world * apps::steadied(&held, &tracks).inverse();
   const scene::PosedScene posed = scene::compose_scene(*known.scene, known.show_state, tracks);
   const cv::Mat out = drawn(camera, image, posed, tracks, known, TabletViewMode::as_screen, &room);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
@@ -407,7 +407,7 @@ TabletView::Seen TabletView::Impl::seen_in_room(const Known& known) {
 
 TabletView::TabletView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<TabletView>> TabletView::create(const SessionSetup& setup,
+Result<std::unique_ptr<TabletView>> TabletView::create(const apps::SessionSetup& setup,
                                                        std::filesystem::path lens_folder) {
   auto impl = std::make_unique<Impl>();
   impl->rig = setup.rig;
@@ -439,13 +439,13 @@ TabletView::~TabletView() {
   impl_->thread.join();
 }
 
-void TabletView::know(const Session& session) {
+void TabletView::know(const apps::Session& session) {
   if (impl_->told_scenes != session.scenes()) {
     impl_->told_scene = std::make_shared<scene::Scene>(session.setup().scene);
     impl_->told_rig = std::make_shared<Rig>(session.setup().rig);
     impl_->told_scenes = session.scenes();
   }
-  const Percepts& watched = session.watched();
+  const apps::Percepts& watched = session.watched();
   auto known = std::make_shared<Known>(Known{.scene = impl_->told_scene,
                                              .rig = impl_->told_rig,
                                              .scenes = session.scenes(),
@@ -489,4 +489,4 @@ void TabletView::room(std::function<void(Seen)> answer) {
   impl_->changed.notify_all();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -13,7 +13,7 @@
 #include "session/recording.h"
 #include "session/session.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// The window of docs/remote.md: finds where guests' tablets are in the images that they send, and draws
 /// the parts into those same images. Has a thread and a GL context of its own, both of low priority: a
@@ -23,14 +23,14 @@ class TabletView {
  public:
   /// `lens_folder` keeps what is known of guests' lenses; made when there is something to keep. Errors: no GL
   /// context, marker families that cannot be loaded, a scene that cannot be drawn.
-  static Result<std::unique_ptr<TabletView>> create(const SessionSetup& setup,
+  static Result<std::unique_ptr<TabletView>> create(const apps::SessionSetup& setup,
                                                     std::filesystem::path lens_folder);
   /// Everybody who still waits is answered first, with nothing.
   ~TabletView();
 
   /// What the session knows now: call it at every image, on the session's thread. Cheap; the scene is
   /// copied when it is another one.
-  void know(const Session& session);
+  void know(const apps::Session& session);
 
   /// An answer to a guest: the window's JSON of docs/remote.md, and an image, empty where there is none.
   struct Seen {
@@ -62,4 +62,4 @@ class TabletView {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

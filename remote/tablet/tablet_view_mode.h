@@ -1,6 +1,6 @@
 #pragma once
 
-namespace limn::apps {
+namespace limn::remote {
 
 /// What a guest's window draws of the parts.
 enum class TabletViewMode {
@@ -9,4 +9,4 @@ enum class TabletViewMode {
   full        ///< whole parts
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

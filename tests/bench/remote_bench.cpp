@@ -65,7 +65,7 @@ class Stage {
   const apps::SessionSetup& setup() const { return setup_; }
 
   // How long a frame took, ms.
-  double frame(apps::Server* server) {
+  double frame(remote::Server* server) {
     constexpr int k_cameras[] = {0};
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
@@ -94,7 +94,7 @@ class Stage {
 // own work is little and goes after everybody's.
 class AuthSessions {
  public:
-  AuthSessions(const apps::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
+  AuthSessions(const remote::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
     const std::string pin = server.invitation().pins[1];
     for (int i = 0; i < k_guests; ++i) {
       const auto paired =
@@ -174,13 +174,13 @@ int run(int argc, char** argv) {
   set_log_level(LogLevel::warning);
   Stage stage;
   const fs::path keys = fs::temp_directory_path() / fmt::format("limn-remote-bench-{}", ::getpid());
-  auto tablet_view = apps::TabletView::create(stage.setup(), keys);
+  auto tablet_view = remote::TabletView::create(stage.setup(), keys);
   if (!tablet_view) {
     fmt::print(stderr, "{}\n", tablet_view.message());
     return 1;
   }
-  const apps::ServeOptions options{.at = "0", .page = {}, .keys = {}};
-  const auto server = apps::Server::open(options, apps::image_providers(std::move(*tablet_view)));
+  const remote::ServeOptions options{.at = "0", .page = {}, .keys = {}};
+  const auto server = remote::Server::open(options, remote::image_providers(std::move(*tablet_view)));
   if (!server) {
     fmt::print(stderr, "{}\n", server.message());
     return 1;

@@ -83,10 +83,10 @@ struct Room {
   }
 };
 
-apps::TabletView::Seen look(apps::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
-  std::promise<apps::TabletView::Seen> answered;
+remote::TabletView::Seen look(remote::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
+  std::promise<remote::TabletView::Seen> answered;
   tablet_view->look({k_device}, jpeg,
-                    [&](apps::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+                    [&](remote::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
   return answered.get_future().get();
 }
 
@@ -125,7 +125,7 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world) {
   return points;
 }
 
-void print_window(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
+void print_window(const std::vector<TabletShot>& shots, Room* room, remote::TabletView* tablet_view) {
   const std::vector<Eigen::Vector3d> points = part_points(room->rig.world());
   tracker::Detector detector(tracker::Families::load(tracker::families_of(scene::bodies(room->setup.scene)),
                                                      room->setup.scene.folder)
@@ -156,7 +156,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
       (void)device::encode_jpeg(image, k_quality);
       const double encoded = now_ms();
       const double asked_processor = processor_ms(), asked = now_ms();
-      const apps::TabletView::Seen seen = look(tablet_view, shot.jpeg);
+      const remote::TabletView::Seen seen = look(tablet_view, shot.jpeg);
       const double answered_processor = processor_ms(), answered = now_ms();
       const json said = json::parse(seen.json);
       LIMN_CHECK(said["sees"] != "nothing");
@@ -197,7 +197,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
 
 // Images painted one after the other, a part nudged in each, with and without somebody who looks on ten
 // times a second; in turn, so that a busy machine disturbs both.
-void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
+void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, remote::TabletView* tablet_view) {
   constexpr int k_turns = 6, k_images = 14;
   std::vector<double> with, without, know;
   for (int turn = 0; turn < 2 * k_turns; ++turn) {
@@ -256,7 +256,7 @@ int main(int argc, char** argv) {
     shots.push_back(tablet.shoot(10.0 * static_cast<double>(i) / static_cast<double>(frames)));
   const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-lenses-{}", getpid());
   {
-    const auto tablet_view = apps::TabletView::create(room.setup, folder).value();
+    const auto tablet_view = remote::TabletView::create(room.setup, folder).value();
     fmt::print("{} pictures of {}x{}, seed {}; {}\n", shots.size(), k_width, k_height, seed,
                room.context.description());
     tablet_view->know(room.session);

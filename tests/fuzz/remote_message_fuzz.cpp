@@ -6,7 +6,7 @@
 #include "remote/http/http.h"
 #include "tests/fuzz/fuzz_file.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 // Told to the guest as JSON: UTF-8, short, and what was expected.
@@ -67,10 +67,10 @@ void check_http(const std::string& text) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  using namespace limn::apps;
+  using namespace limn::remote;
   const std::string text(reinterpret_cast<const char*>(bytes), size);
   if (const auto message = message_of(text); message) {
     check_message(*message);

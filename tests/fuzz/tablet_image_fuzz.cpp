@@ -34,15 +34,15 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   static const std::vector<Body> known = bodies();
   static const std::vector<Track> where = tracks();
   static const tracker::Families families = tracker::Families::load(tracker::families_of(known)).value();
-  const auto image = apps::decode_tablet_image({bytes, size});
+  const auto image = remote::decode_tablet_image({bytes, size});
   if (!image) {
     LIMN_CHECK(image.message().find("expected") != std::string::npos);
     return 0;
   }
-  LIMN_CHECK(image->type() == CV_8UC3 && std::max(image->cols, image->rows) <= apps::k_drawn_side);
-  apps::TabletLocalizer eye(families);
+  LIMN_CHECK(image->type() == CV_8UC3 && std::max(image->cols, image->rows) <= remote::k_drawn_side);
+  remote::TabletLocalizer eye(families);
   for (int i = 0; i < 2; ++i) {  // the second time with what it learnt
-    const apps::TabletPose sight = eye.look(*image, known, where);
+    const remote::TabletPose sight = eye.look(*image, known, where);
     eye.learn();
     LIMN_CHECK(sight.view.has_value() == sight.why.empty());
     LIMN_CHECK(std::isfinite(sight.focal_stddev_px) && sight.focal_stddev_px > 0);

@@ -19,7 +19,7 @@
 #include "tests/remote/remote_client.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -124,4 +124,4 @@ class AServer : public testing::Test {
   std::unique_ptr<Server> server_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

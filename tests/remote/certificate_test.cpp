@@ -14,7 +14,7 @@
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -113,4 +113,4 @@ TEST(Certificate, OfAnAddressThatAnyoneReachesHasAnAuthorityThatMaySpeakForIt) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 using namespace std::chrono_literals;
@@ -145,4 +145,4 @@ TEST_F(AReception, ShowsALesserRoleNoRoomWhileItIsHidden) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -17,7 +17,7 @@
 #include "remote/http/static_files.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -387,7 +387,7 @@ TEST(StaticFiles, AreTheFolderAsItWasAndNothingElse) {
 }
 
 TEST(QrCode, HasAMarginAndThreeEyes) {
-  const cv::Mat code = qr_code("https://192.168.7.2:8443/#pin=123456");
+  const cv::Mat code = apps::qr_code("https://192.168.7.2:8443/#pin=123456");
   ASSERT_FALSE(code.empty());
   EXPECT_EQ(code.rows, code.cols);
   const int last = code.cols - 1 - 4;
@@ -395,8 +395,8 @@ TEST(QrCode, HasAMarginAndThreeEyes) {
   for (int i = 0; i < code.cols; ++i) EXPECT_FALSE(is_black(i, 3));
   for (int i = 0; i < 7; ++i)
     EXPECT_TRUE(is_black(4 + i, 4) && is_black(last - i, 4) && is_black(4 + i, last)) << i;
-  EXPECT_TRUE(qr_code(std::string(3000, 'x')).empty());
+  EXPECT_TRUE(apps::qr_code(std::string(3000, 'x')).empty());
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

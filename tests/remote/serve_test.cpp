@@ -5,7 +5,7 @@
 #include "remote/http/own_addresses.h"
 #include "tests/remote/a_server.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 const std::string k_jpeg = "\xff\xd8\xff\xd9";  // its first and last bytes
@@ -474,4 +474,4 @@ TEST_F(AServer, EndsInUnderASecondWithGuestsInTheHouse) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -27,7 +27,7 @@
 #include "tracker/family.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -48,14 +48,14 @@ class Room {
   explicit Room(const fs::path& lens_folder, double resolution = 0.5, double frame_period_s = 1 / 30.0)
       : context_(device::GlContext::create().value()) {
     sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
     EXPECT_TRUE(scale_resolution(resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_.emplace(std::move(world),
                  sim::VirtualRigOptions{.frame_period_s = frame_period_s, .grab_waits_for_light = false});
-    perception_ = Perception::create(setup_.scene, setup_.rig).value();
-    session_ = Session::create(setup_, nullptr, nullptr, false).value();
+    perception_ = apps::Perception::create(setup_.scene, setup_.rig).value();
+    session_ = apps::Session::create(setup_, nullptr, nullptr, false).value();
     tablet_view_ = TabletView::create(setup_, lens_folder).value();
     for (int i = 0; i < 8; ++i) step();
   }
@@ -64,7 +64,7 @@ class Room {
   void step() {
     const int camera = 0;
     session_->take(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
-    const ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
+    const apps::ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig_->projector(static_cast<int>(k)).show(painted.projectors[k]).value();
     tablet_view_->know(*session_);
@@ -94,15 +94,15 @@ class Room {
 
   TabletView& tablet_view() { return *tablet_view_; }
   void end_onlooker() { tablet_view_.reset(); }
-  Session& session() { return *session_; }
+  apps::Session& session() { return *session_; }
   sim::VirtualRig& rig() { return *rig_; }
 
  private:
   device::GlContext context_;
-  SessionSetup setup_;
+  apps::SessionSetup setup_;
   std::optional<sim::VirtualRig> rig_;
-  std::optional<Perception> perception_;
-  std::optional<Session> session_;
+  std::optional<apps::Perception> perception_;
+  std::optional<apps::Session> session_;
   std::unique_ptr<TabletView> tablet_view_;
   std::size_t moments_ = 0;
 };
@@ -249,7 +249,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   const fs::path folder = test::test_folder();
   constexpr double k_period_s = 0.1;
   Room room(folder / "lenses", 0.25, k_period_s);
-  Session& session = room.session();
+  apps::Session& session = room.session();
   const sim::World& world = room.rig().world();
   test::VirtualTablet tablet = room.tablet(6);
   for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
@@ -322,7 +322,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
 TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses", 0.25);
-  Session& session = room.session();
+  apps::Session& session = room.session();
   const auto edit = [&](const char* action, const char* slot, const char* value) {
     const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
     EXPECT_TRUE(done.ok()) << done.message();
@@ -487,7 +487,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
 
 TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnImage) {
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   const scene::Scene scene = *world.scene;
   const std::vector<Body> bodies = scene::bodies(scene);
   // What the session takes to be true.
@@ -553,4 +553,4 @@ TEST(Tablet, LensesThatAreKeptAreThereAgainAndDamagedOnesAreNot) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote
