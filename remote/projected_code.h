@@ -24,9 +24,9 @@ class ProjectedCode {
 
   /// How long it is shown.
   void set_duration(std::chrono::milliseconds duration) { duration_ = duration; }
-  /// From the next frame on a projector shows this code; no other one does then. `begun` is told, when it is
-  /// seen first, until when.
-  void show(const std::string& projector, Text text, std::function<void(Clock::time_point until)> begun);
+  /// From the next frame on a projector shows this code; no other one does then. `on_shown` is told, when it
+  /// is seen first, until when.
+  void show(const std::string& projector, Text text, std::function<void(Clock::time_point until)> on_shown);
   /// Who shows it; empty: nobody.
   const std::string& projector() const { return projector_; }
 
@@ -35,14 +35,14 @@ class ProjectedCode {
   std::vector<apps::Overlay> overlays(apps::Session* session);
 
  private:
-  bool has_begun(apps::Session* session, std::size_t projector);
+  bool start_if_due(apps::Session* session, std::size_t projector);
   void end();
 
   std::chrono::milliseconds duration_{};
   std::string projector_;
   Text text_;
-  std::function<void(Clock::time_point)> begun_;
-  std::optional<Clock::time_point> asked_, searched_, until_;  // none before the first frame
+  std::function<void(Clock::time_point)> on_shown_;
+  std::optional<Clock::time_point> requested_at_, searched_at_, shown_until_;  // none before the first frame
   cv::Mat sign_;
   std::optional<apps::OverlayPlace> place_;  // on the prototype
 };

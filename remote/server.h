@@ -32,7 +32,7 @@ struct ServeOptions {
   std::filesystem::path keys;     ///< of the certificate; empty: Limn's own folder
   bool always_encrypted = false;  ///< TLS on the loopback, too
   NetworkLimits limits = {};
-  std::chrono::milliseconds code_lasts{60000};  ///< in a projector's light
+  std::chrono::milliseconds code_duration{60000};  ///< in a projector's light
 };
 
 /// The remote of a session (docs/remote.md): guests on its network. What SessionClient and RemoteLink have
@@ -44,25 +44,25 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
   static Result<std::unique_ptr<Server>> open(const ServeOptions& options, ImageProviders providers);
   ~Server() override;
 
-  /// Tells the session where guests' tablets look from. Does what guests want, at most k_most_at_once edits
-  /// and for at most 5 ms; the others wait for the next call. What cannot be done is answered to who wanted
-  /// it.
-  void hear(apps::Session* session, Stamp at);
+  /// Tells the session where guests' tablets look from. Does what guests want, at most k_max_edits_at_once
+  /// edits and for at most 5 ms; the others wait for the next call. What cannot be done is answered to who
+  /// wanted it.
+  void apply_edits(apps::Session* session, Stamp at);
   /// Lets guests know: at once after an edit, else twenty times a second, and once a second while there are
   /// none.
-  void tell(const apps::Session& session,
-            const apps::Telemetry& telemetry,
-            const apps::DeviceHealth& health,
-            Stamp at);
+  void publish_state(const apps::Session& session,
+                     const apps::Telemetry& telemetry,
+                     const apps::DeviceHealth& health,
+                     Stamp at);
 
   /// Both hear and tell: what came while a frame was made need not wait for the next one.
   void hear(const apps::SessionMoment& moment) override;
   void tell(const apps::SessionMoment& moment) override { hear(moment); }
   std::vector<apps::Overlay> overlays(apps::Session* session) override;
 
-  /// From its next image on a projector shows the code that pairs for a role, for ServeOptions::code_lasts;
-  /// no other one does then. Guests of lesser roles see no images of the room meanwhile, since its cameras
-  /// see the code.
+  /// From its next image on a projector shows the code that pairs for a role, for
+  /// ServeOptions::code_duration; no other one does then. Guests of lesser roles see no images of the room
+  /// meanwhile, since its cameras see the code.
   void show_code(const std::string& projector, Role role) override;
   /// Who shows it; empty: nobody.
   const std::string& code_projector() const override { return code_.projector(); }
@@ -72,33 +72,33 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
   const apps::Invitation& invitation() const override { return invitation_; }
   int port() const { return network_->port(); }
 
-  static constexpr std::size_t k_most_at_once = 64;
+  static constexpr std::size_t k_max_edits_at_once = 64;
 
  private:
   using Clock = std::chrono::steady_clock;
   Server() = default;
-  std::optional<Wish> next_wish();
+  std::optional<Wish> next_edit_request();
 
   apps::Invitation invitation_;
   WorkerThread worker_;
   std::unique_ptr<Reception> reception_;
   std::unique_ptr<Network> network_;
-  std::atomic<bool> is_watched_ = false;  // somebody is paired
+  std::atomic<bool> has_guests_ = false;  // somebody is paired
 
   std::mutex mutex_;
-  std::deque<Wish> wishes_;                                       // for the session
-  std::map<std::string, std::optional<Eigen::Vector3d>> places_;  // likewise: the newest of each guest
-  std::optional<SessionNews> news_;                               // for the network
+  std::deque<Wish> edit_requests_;                                    // for the session
+  std::map<std::string, std::optional<Eigen::Vector3d>> viewpoints_;  // likewise: the newest of each guest
+  std::optional<SessionNews> news_;                                   // for the network
   bool is_news_posted_ = false;
 
-  std::vector<Outcome> outcomes_;  // the session's alone, as the rest
-  std::function<void(const apps::Session&)> know_;
+  std::vector<Outcome> edit_results_;  // the session's alone, as the rest
+  std::function<void(const apps::Session&)> update_providers_;
   std::shared_ptr<const scene::Scene> scene_;
   int scenes_ = 0;
   ProjectedCode code_;
-  std::optional<Clock::time_point> told_at_;
+  std::optional<Clock::time_point> published_at_;
   std::optional<Stamp> begun_at_;
-  std::size_t told_edits_ = 0;
+  std::size_t published_edits_ = 0;
 };
 
 }  // namespace limn::remote

@@ -17,14 +17,14 @@ namespace limn::remote {
 constexpr std::size_t k_token_bytes = 32;
 /// How long a guest's session lasts, and how many there are at once: the oldest goes for one more.
 constexpr std::chrono::hours k_session_life{12};
-constexpr std::size_t k_most_sessions = 256;
+constexpr std::size_t k_max_sessions = 256;
 /// Wrong PINs after which nobody is paired for a while: from one address, and from all.
-constexpr int k_most_wrong = 10, k_most_wrong_of_all = 100;
+constexpr int k_max_wrong_pins = 10, k_max_wrong_pins_of_all = 100;
 /// That while: every time twice as long, up to the second.
 constexpr std::chrono::minutes k_first_wait{1}, k_longest_wait{16};
 /// An address that tried nothing wrong for so long begins anew; so many are remembered.
-constexpr std::chrono::minutes k_forgets_after{60};
-constexpr std::size_t k_most_addresses = 1024;
+constexpr std::chrono::minutes k_attempts_kept_for{60};
+constexpr std::size_t k_max_addresses = 1024;
 
 /// Who may come in: three PINs, one a role, drawn anew for every Guests; sessions of those who were paired.
 /// Belongs to one thread; moments are the caller's, so that hours can pass in a test.
@@ -64,8 +64,8 @@ class AuthSessions {
 
   /// Whose token it is; nullopt: nobody's, or the session is over.
   std::optional<Guest> find(const std::string& token, Time now) const;
-  bool lives(std::uint64_t guest, Time now) const;
-  void leave(std::uint64_t guest);
+  bool is_valid(std::uint64_t guest, Time now) const;
+  void end_session(std::uint64_t guest);
   std::size_t count() const { return sessions_.size(); }
 
  private:
@@ -73,22 +73,22 @@ class AuthSessions {
     std::array<unsigned char, k_token_bytes> token;
     Guest guest;
   };
-  struct Tries {
+  struct Attempts {
     int wrong = 0;
     std::chrono::minutes next_wait = k_first_wait;
-    std::optional<Time> waits_until;
+    std::optional<Time> locked_until;
     Time last;
   };
-  std::string told_apart(const std::string& name) const;
-  std::optional<Wait> wait_of(const Tries& tries, Time now) const;
-  void note_wrong(Tries* tries, int most, Time now);
-  Tries* tries_of(const std::string& address, Time now);
+  std::string unique_name(const std::string& name) const;
+  std::optional<Wait> wait_of(const Attempts& attempts, Time now) const;
+  void count_wrong_pin(Attempts* attempts, int most, Time now);
+  Attempts* attempts_of(const std::string& address, Time now);
 
   std::array<std::string, 3> pins_;
   std::vector<Session> sessions_;  // oldest first
   std::uint64_t last_number_ = 0;
-  std::map<std::string, Tries> tries_;  // by address
-  Tries of_all_;
+  std::map<std::string, Attempts> attempts_;  // by address
+  Attempts all_attempts_;
 };
 
 }  // namespace limn::remote

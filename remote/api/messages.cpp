@@ -9,17 +9,17 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t k_shortest_device = 8, k_longest_device = 64, k_pin_digits = 6;
-constexpr std::uint64_t k_most_id = (std::uint64_t{1} << 53) - 1;  // that a page's numbers hold
-constexpr std::size_t k_quoted = 40;                               // bytes of what was found, in errors
+constexpr std::uint64_t k_max_id = (std::uint64_t{1} << 53) - 1;  // that a page's numbers hold
+constexpr std::size_t k_max_quoted = 40;                          // bytes of what was found, in errors
 
 // For errors: short, without control characters, never half a letter.
 std::string in_quotes(const std::string& text) {
   std::string out;
-  for (const char c : text.substr(0, k_quoted)) {
+  for (const char c : text.substr(0, k_max_quoted)) {
     const auto byte = static_cast<unsigned char>(c);
     out += byte < 0x20 || byte >= 0x7f ? '?' : c;
   }
-  return "'" + out + (text.size() > k_quoted ? "…'" : "'");
+  return "'" + out + (text.size() > k_max_quoted ? "…'" : "'");
 }
 
 std::string found_in(const json& value) {
@@ -115,14 +115,14 @@ scene::Edit read_edit(Reader* reader) {
   return edit;
 }
 
-Remark read_remark(Reader* reader) {
-  Remark remark;
-  remark.look = reader->text("look", k_longest_word, true);
-  remark.slot = reader->text("slot", k_longest_word, true);
-  remark.text = reader->text("text", scene::k_longest_comment, false, true);
-  if (remark.text.find_first_not_of(" \n") == std::string::npos)
+CommentRequest read_comment(Reader* reader) {
+  CommentRequest comment;
+  comment.look = reader->text("look", k_longest_word, true);
+  comment.slot = reader->text("slot", k_longest_word, true);
+  comment.text = reader->text("text", scene::k_longest_comment, false, true);
+  if (comment.text.find_first_not_of(" \n") == std::string::npos)
     reader->problem("text", "a remark", "nothing");
-  return remark;
+  return comment;
 }
 
 bool is_device_name(const std::string& name) {
@@ -134,15 +134,16 @@ bool is_device_name(const std::string& name) {
 
 Message read_message(const std::string& type, Reader* reader) {
   if (type == "edit") {
-    const std::uint64_t id = reader->number("id", k_most_id);
+    const std::uint64_t id = reader->number("id", k_max_id);
     return EditMessage{id, read_edit(reader)};
   }
   if (type == "comment") {
-    const std::uint64_t id = reader->number("id", k_most_id);
-    return RemarkMessage{id, read_remark(reader)};
+    const std::uint64_t id = reader->number("id", k_max_id);
+    return CommentMessage{id, read_comment(reader)};
   }
   if (type == "pictures") return ImagesMessage{reader->boolean("room")};
-  if (type == "seen") return SeenMessage{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu))};
+  if (type == "seen")
+    return ImageShownMessage{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu))};
   if (type == "window") {
     WindowMessage window{reader->text("device", k_longest_word, false), reader->boolean("on")};
     const std::string parts = reader->text("parts", k_longest_word, true);
@@ -181,7 +182,7 @@ void put_number(std::uint32_t number, std::string* out) {
 
 }  // namespace
 
-Result<Message> message_of(std::string_view text) {
+Result<Message> parse_message(std::string_view text) {
   LIMN_TRY(Reader reader, Reader::of(text));
   const std::string type = reader.text("type", k_longest_word, false);
   Message message = read_message(type, &reader);
@@ -189,12 +190,12 @@ Result<Message> message_of(std::string_view text) {
   return message;
 }
 
-std::optional<std::uint64_t> id_of(std::string_view text) {
+std::optional<std::uint64_t> parse_message_id(std::string_view text) {
   if (text.size() > k_longest_message) return std::nullopt;
   const json all = json::parse(text, nullptr, false);
   if (!all.is_object()) return std::nullopt;
   const auto id = all.find("id");
-  if (id == all.end() || !id->is_number_unsigned() || id->get<std::uint64_t>() > k_most_id)
+  if (id == all.end() || !id->is_number_unsigned() || id->get<std::uint64_t>() > k_max_id)
     return std::nullopt;
   return id->get<std::uint64_t>();
 }
@@ -204,44 +205,45 @@ const std::vector<std::string>& reserved_names() {
   return all;
 }
 
-Result<PairWish> pair_of_body(std::string_view text) {
+Result<PairRequest> parse_pairing(std::string_view text) {
   LIMN_TRY(Reader reader, Reader::of(text));
-  PairWish wish{reader.text("pin", k_longest_word, false), reader.text("name", k_longest_guest_name, true)};
-  if (wish.pin.size() != k_pin_digits ||
-      !std::all_of(wish.pin.begin(), wish.pin.end(), [](char c) { return c >= '0' && c <= '9'; }))
+  PairRequest request{reader.text("pin", k_longest_word, false),
+                      reader.text("name", k_longest_guest_name, true)};
+  if (request.pin.size() != k_pin_digits ||
+      !std::all_of(request.pin.begin(), request.pin.end(), [](char c) { return c >= '0' && c <= '9'; }))
     reader.problem("pin", fmt::format("{} digits", k_pin_digits), "other text");
-  const auto first = wish.name.find_first_not_of(' ');
-  wish.name = first == std::string::npos
-                  ? "guest"
-                  : wish.name.substr(first, wish.name.find_last_not_of(' ') + 1 - first);
-  if (is_reserved(wish.name))
+  const auto first = request.name.find_first_not_of(' ');
+  request.name = first == std::string::npos
+                     ? "guest"
+                     : request.name.substr(first, request.name.find_last_not_of(' ') + 1 - first);
+  if (is_reserved(request.name))
     reader.problem(
         "name", fmt::format("a name without ':' that is none of Limn's own ({})", list_of(reserved_names())),
-        in_quotes(wish.name));
+        in_quotes(request.name));
   LIMN_TRY_STATUS(reader.status());
-  return wish;
+  return request;
 }
 
-Result<scene::Edit> edit_of_body(std::string_view text) {
+Result<scene::Edit> parse_edit(std::string_view text) {
   LIMN_TRY(Reader reader, Reader::of(text));
   scene::Edit edit = read_edit(&reader);
   LIMN_TRY_STATUS(reader.status());
   return edit;
 }
 
-Result<Remark> remark_of_body(std::string_view text) {
+Result<CommentRequest> parse_comment(std::string_view text) {
   LIMN_TRY(Reader reader, Reader::of(text));
-  Remark remark = read_remark(&reader);
+  CommentRequest comment = read_comment(&reader);
   LIMN_TRY_STATUS(reader.status());
-  return remark;
+  return comment;
 }
 
-Status empty_body(std::string_view text) {
+Status parse_empty_body(std::string_view text) {
   LIMN_TRY(const Reader reader, Reader::of(text));
   return reader.status();
 }
 
-Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes) {
+Result<FrameMessage> parse_frame(std::span<const std::uint8_t> bytes) {
   if (bytes.size() > k_longest_frame)
     return error("expected a picture of at most {} bytes, found {}.", k_longest_jpeg, bytes.size() - 4);
   if (bytes.size() < 8 || bytes[4] != 0xff || bytes[5] != 0xd8)

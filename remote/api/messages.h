@@ -16,13 +16,13 @@
 
 namespace limn::remote {
 
-/// The longest texts that are looked at, bytes; a remark's is scene::k_longest_comment.
+/// The longest texts that are looked at, bytes; a comment's is scene::k_longest_comment.
 constexpr std::size_t k_longest_message = 16 * 1024, k_longest_word = 200, k_longest_guest_name = 64;
 /// A frame of the window: its number and at most so much JPEG.
 constexpr std::size_t k_longest_jpeg = 4 * 1024 * 1024, k_longest_frame = 4 + k_longest_jpeg;
 
 /// What a guest writes about a look or a part; both may be empty.
-struct Remark {
+struct CommentRequest {
   std::string look, slot, text;
 };
 
@@ -31,14 +31,14 @@ struct EditMessage {
   std::uint64_t id = 0;  ///< of the page, for the answer
   scene::Edit edit;
 };
-struct RemarkMessage {
+struct CommentMessage {
   std::uint64_t id = 0;
-  Remark remark;
+  CommentRequest comment;
 };
 struct ImagesMessage {
   bool room = false;
 };
-struct SeenMessage {
+struct ImageShownMessage {
   std::uint32_t image = 0;
 };
 struct WindowMessage {
@@ -46,34 +46,34 @@ struct WindowMessage {
   bool on = false;
   TabletViewMode parts = TabletViewMode::as_screen;  ///< also when it is left out
 };
-using Message = std::variant<EditMessage, RemarkMessage, ImagesMessage, SeenMessage, WindowMessage>;
+using Message = std::variant<EditMessage, CommentMessage, ImagesMessage, ImageShownMessage, WindowMessage>;
 
 /// A text message. Errors say what was expected: no JSON object, an unknown type or action, keys that are
 /// missing, unknown or of another kind, text that is too long or has control characters. Slots, variants and
 /// looks are the scene's affair.
-Result<Message> message_of(std::string_view text);
+Result<Message> parse_message(std::string_view text);
 /// The id in a message that could not be understood otherwise.
-std::optional<std::uint64_t> id_of(std::string_view text);
+std::optional<std::uint64_t> parse_message_id(std::string_view text);
 
 /// Bodies of HTTP requests; errors as above.
-struct PairWish {
+struct PairRequest {
   std::string pin;   ///< six digits
   std::string name;  ///< without blanks around it; "guest" when it was left out or empty
 };
 /// Names that the log gives to Limn's own doings: no guest's, however they are written; nor is one with ':',
 /// as markers have it.
 const std::vector<std::string>& reserved_names();
-Result<PairWish> pair_of_body(std::string_view text);
-Result<scene::Edit> edit_of_body(std::string_view text);
-Result<Remark> remark_of_body(std::string_view text);
-Status empty_body(std::string_view text);  ///< {}
+Result<PairRequest> parse_pairing(std::string_view text);
+Result<scene::Edit> parse_edit(std::string_view text);
+Result<CommentRequest> parse_comment(std::string_view text);
+Status parse_empty_body(std::string_view text);  ///< {}
 
 /// A binary message of the window. Error: too short, too long, no JPEG's beginning.
 struct FrameMessage {
   std::uint32_t number = 0;
   std::span<const std::uint8_t> jpeg;  ///< within the bytes given
 };
-Result<FrameMessage> frame_of(std::span<const std::uint8_t> bytes);
+Result<FrameMessage> parse_frame(std::span<const std::uint8_t> bytes);
 
 /// A binary message to the page: kind, number, JSON and image.
 enum class ImageKind : std::uint32_t { room = 1, window = 2 };

@@ -25,11 +25,11 @@ std::string dumped(const ordered_json& json) {
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-HttpAnswer json_answer(std::string body) {
+HttpResponse json_answer(std::string body) {
   return {200, "application/json", std::move(body), {{"Cache-Control", "no-store"}}};
 }
 
-HttpAnswer unkept(const char* type, std::string bytes) {
+HttpResponse unkept(const char* type, std::string bytes) {
   return {200, type, std::move(bytes), {{"Cache-Control", "no-store"}}};
 }
 
@@ -78,7 +78,7 @@ struct Reception::Route {
   const char* method;
   std::string path;
   Role role;
-  void (Reception::*answer)(const Asked&, Answering);
+  void (Reception::*answer)(const Asked&, ResponseCallback);
 };
 
 // The network's side of one client.
@@ -94,7 +94,7 @@ class Reception::Connection : public WebSocketPeer {
   void receive_text(std::string_view text) override { reception_->hear_text(client_, text); }
   void receive_bytes(std::span<const std::uint8_t> bytes) override { reception_->hear_bytes(client_, bytes); }
   void close() override { reception_->gone(client_); }
-  std::optional<Outgoing> next_message() override { return client_->outbox.next(); }
+  std::optional<Outgoing> next_message() override { return client_->outbox.next_message(); }
   bool is_over() const override { return client_->outbox.is_over(); }
   std::size_t longest_message() const override { return client_->longest_message(); }
 
@@ -125,14 +125,14 @@ Reception::Reception(Setup setup)
       thumbnails_(std::make_shared<Thumbnails>()) {}
 
 // Requests that nobody honest sends: from other pages, or under a name that somebody else gave this machine.
-std::optional<HttpAnswer> Reception::refuse(const HttpRequest& request) const {
+std::optional<HttpResponse> Reception::refuse(const HttpRequest& request) const {
   const std::string host = host_in(request.host);
-  if (host.empty()) return refusal(k_bad, "expected a Host header, found none.");
+  if (host.empty()) return error_response(k_bad, "expected a Host header, found none.");
   if (setup_.is_loopback && host != "localhost" && !is_loopback(host))
-    return refusal(k_forbidden, "expected localhost or 127.0.0.1 as the host, found another name.");
+    return error_response(k_forbidden, "expected localhost or 127.0.0.1 as the host, found another name.");
   if (!request.origin.empty() &&
       request.origin != (setup_.is_encrypted ? "https://" : "http://") + request.host)
-    return refusal(k_forbidden, "expected a request of Limn's own page, found one of another origin.");
+    return error_response(k_forbidden, "expected a request of Limn's own page, found one of another origin.");
   return std::nullopt;
 }
 
@@ -144,40 +144,43 @@ std::optional<AuthSessions::Guest> Reception::guest_of(const HttpRequest& reques
   return guests_.find(token, Clock::now());
 }
 
-void Reception::handle_request(const HttpRequest& request, Answering answering) {
+void Reception::handle_request(const HttpRequest& request, ResponseCallback answering) {
   if (auto refused = refuse(request)) return answering(std::move(*refused));
   const auto path = path_of(request.target);
-  if (!path) return answering(refusal(k_bad, "expected a path that begins with '/'."));
+  if (!path) return answering(error_response(k_bad, "expected a path that begins with '/'."));
   const bool changes = request.method != "GET" && request.method != "HEAD";
   if (changes && !is_json(request.content_type))
-    return answering(refusal(k_not_json, "expected Content-Type: application/json."));
+    return answering(error_response(k_not_json, "expected Content-Type: application/json."));
   if (*path == "/api/pair")
     return answering(request.method == "POST" ? pair(request)
-                                              : refusal(k_wrong_method, "/api/pair: expected POST."));
+                                              : error_response(k_wrong_method, "/api/pair: expected POST."));
   if (!path->starts_with("/api/") && !path->starts_with("/picture/") && !path->starts_with("/look/"))
     return answering(file(request, *path));
   const auto guest = guest_of(request);
-  if (!guest) return answering(refusal(k_unpaired, "expected a paired guest. POST /api/pair with a PIN."));
-  if (*path == k_live) return answering(refusal(k_bad, "/api/live: expected an upgrade to a WebSocket."));
+  if (!guest)
+    return answering(error_response(k_unpaired, "expected a paired guest. POST /api/pair with a PIN."));
+  if (*path == k_live)
+    return answering(error_response(k_bad, "/api/live: expected an upgrade to a WebSocket."));
   for (const Route& route : routes()) {
     if (route.path.back() == '/' ? !path->starts_with(route.path) : *path != route.path) continue;
     if (request.method != route.method)
-      return answering(refusal(k_wrong_method, fmt::format("{}: expected {}.", route.path, route.method)));
+      return answering(
+          error_response(k_wrong_method, fmt::format("{}: expected {}.", route.path, route.method)));
     if (guest->role < route.role)
-      return answering(refusal(k_forbidden, may_not(*guest, route.path, route.role)));
+      return answering(error_response(k_forbidden, may_not(*guest, route.path, route.role)));
     return (this->*route.answer)({*guest, *path, request.body, request.if_none_match}, std::move(answering));
   }
-  answering(refusal(k_absent, "expected a path of docs/remote.md, found another one."));
+  answering(error_response(k_absent, "expected a path of docs/remote.md, found another one."));
 }
 
-HttpAnswer Reception::file(const HttpRequest& request, const std::string& path) const {
+HttpResponse Reception::file(const HttpRequest& request, const std::string& path) const {
   if (path == k_authority && request.method == "GET" && !setup_.authority.empty())
     return {200, "application/x-x509-ca-cert", setup_.authority, {{"Cache-Control", "no-cache"}}};
   const StaticFiles::File* file = setup_.files.find(path);
-  if (!file) return refusal(k_absent, "expected a file of the page, found another path.");
+  if (!file) return error_response(k_absent, "expected a file of the page, found another path.");
   if (request.method != "GET" && request.method != "HEAD")
-    return refusal(k_wrong_method, "expected GET or HEAD.");
-  HttpAnswer out{200, file->type, file->content, {{"Cache-Control", "no-cache"}, {"ETag", file->tag}}};
+    return error_response(k_wrong_method, "expected GET or HEAD.");
+  HttpResponse out{200, file->type, file->content, {{"Cache-Control", "no-cache"}, {"ETag", file->tag}}};
   if (request.if_none_match == file->tag) {
     out.status = 304;
     out.body.clear();
@@ -185,34 +188,37 @@ HttpAnswer Reception::file(const HttpRequest& request, const std::string& path) 
   return out;
 }
 
-HttpAnswer Reception::pair(const HttpRequest& request) {
-  const auto wish = pair_of_body(request.body);
-  if (!wish) return refusal(k_bad, wish.message());
+HttpResponse Reception::pair(const HttpRequest& request) {
+  const auto wish = parse_pairing(request.body);
+  if (!wish) return error_response(k_bad, wish.message());
   auto found = guests_.pair(wish->pin, wish->name, request.address, Clock::now(), guest_of(request));
   if (const auto* wait = std::get_if<AuthSessions::Wait>(&found)) {
-    HttpAnswer out = refusal(k_too_many, fmt::format("too many wrong PINs. Wait {} s.", wait->left.count()));
+    HttpResponse out =
+        error_response(k_too_many, fmt::format("too many wrong PINs. Wait {} s.", wait->left.count()));
     out.headers.emplace_back("Retry-After", std::to_string(wait->left.count()));
     return out;
   }
   const auto* paired = std::get_if<AuthSessions::Paired>(&found);
-  if (!paired) return refusal(k_unpaired, "this PIN is wrong. It stands in the operator's window.");
+  if (!paired) return error_response(k_unpaired, "this PIN is wrong. It stands in the operator's window.");
   setup_.watched(true);
   const auto life_s = std::chrono::seconds(k_session_life).count();
-  HttpAnswer out = json_answer(dumped({{"role", name_of(paired->guest.role)},
-                                       {"name", paired->guest.name},
-                                       {"token", paired->token},
-                                       {"expires_s", life_s}}));
+  HttpResponse out = json_answer(dumped({{"role", name_of(paired->guest.role)},
+                                         {"name", paired->guest.name},
+                                         {"token", paired->token},
+                                         {"expires_s", life_s}}));
   out.headers.emplace_back(
       "Set-Cookie", fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={}{}", setup_.cookie,
                                 paired->token, life_s, setup_.is_encrypted ? "; Secure" : ""));
   return out;
 }
 
-void Reception::get_state(const Asked&, Answering answering) {
-  answering(state_ ? json_answer(*state_) : refusal(k_unavailable, "the session has not begun yet."));
+void Reception::get_state(const Asked&, ResponseCallback answering) {
+  answering(state_ ? json_answer(*state_) : error_response(k_unavailable, "the session has not begun yet."));
 }
 
-void Reception::get_actions(const Asked&, Answering answering) { answering(json_answer(actions_json())); }
+void Reception::get_actions(const Asked&, ResponseCallback answering) {
+  answering(json_answer(actions_json()));
+}
 
 void Reception::hide_room(Role role, Clock::time_point until) {
   const bool is_hidden = Clock::now() < hidden_.second;
@@ -223,27 +229,28 @@ bool Reception::may_see_room(const AuthSessions::Guest& guest) const {
   return guest.role >= hidden_.first || Clock::now() >= hidden_.second;
 }
 
-void Reception::get_room(const Asked& asked, Answering answering) {
-  if (!may_see_room(asked.guest)) return answering(refusal(k_unavailable, k_hidden));
-  if (!setup_.providers.room) return answering(refusal(k_unavailable, "this session has no live composite."));
-  setup_.providers.room([answering = std::move(answering)](const ImageProviders::Seen& seen) {
-    answering(seen.jpeg.empty() ? refusal(k_absent, "no camera's picture has come yet.")
+void Reception::get_room(const Asked& asked, ResponseCallback answering) {
+  if (!may_see_room(asked.guest)) return answering(error_response(k_unavailable, k_hidden));
+  if (!setup_.providers.draw_room)
+    return answering(error_response(k_unavailable, "this session has no live composite."));
+  setup_.providers.draw_room([answering = std::move(answering)](const CompositeImage& seen) {
+    answering(seen.jpeg.empty() ? error_response(k_absent, "no camera's picture has come yet.")
                                 : unkept("image/jpeg", {seen.jpeg.begin(), seen.jpeg.end()}));
   });
 }
 
-void Reception::do_on_worker(std::function<HttpAnswer()> job, Answering answering) {
+void Reception::do_on_worker(std::function<HttpResponse()> job, ResponseCallback answering) {
   if (!setup_.worker->take([job = std::move(job), answering] { answering(job()); }))
-    answering(refusal(k_unavailable, "too many pictures are asked for at once."));
+    answering(error_response(k_unavailable, "too many pictures are asked for at once."));
 }
 
-void Reception::get_projector(const Asked& asked, Answering answering) {
+void Reception::get_projector(const Asked& asked, ResponseCallback answering) {
   const auto name = name_in(asked.path, "/picture/projector/", ".jpg");
   std::size_t index = 0;
   const std::size_t count = news_ ? std::min(news_->state.projectors.size(), news_->projectors.size()) : 0;
   while (name && index < count && news_->state.projectors[index] != *name) ++index;
   if (!name || index >= count || news_->projectors[index].empty())
-    return answering(refusal(k_absent, "expected a projector of the state, found another name."));
+    return answering(error_response(k_absent, "expected a projector of the state, found another name."));
   do_on_worker(
       [known = encoded_, name = *name, image = news_->projectors[index]] {
         Encoded& encoded = (*known)[name];
@@ -256,35 +263,36 @@ void Reception::get_projector(const Asked& asked, Answering answering) {
       std::move(answering));
 }
 
-void Reception::get_look_image(const Asked& asked, Answering answering) {
+void Reception::get_look_image(const Asked& asked, ResponseCallback answering) {
   const auto name = name_in(asked.path, "/picture/look/", ".png");
   if (!name || !news_ || !is_in(news_->state.looks, *name))
-    return answering(refusal(k_absent, "expected a look of the state, found another name."));
+    return answering(error_response(k_absent, "expected a look of the state, found another name."));
   do_on_worker(
       [path = news_->scene->folder / "looks" / (*name + ".png")] {
         auto png = read_file(path);
-        return png ? unkept("image/png", std::move(*png)) : refusal(k_absent, "this look has no picture.");
+        return png ? unkept("image/png", std::move(*png))
+                   : error_response(k_absent, "this look has no picture.");
       },
       std::move(answering));
 }
 
-void Reception::get_look_assembly(const Asked& asked, Answering answering) {
+void Reception::get_look_assembly(const Asked& asked, ResponseCallback answering) {
   const auto name = name_in(asked.path, "/look/", ".glb");
   const scene::Look* look = nullptr;
   if (name && news_)
     for (const scene::Look& each : news_->looks)
       if (each.name == *name) look = &each;
-  if (!look) return answering(refusal(k_absent, "expected a look of the state, found another name."));
+  if (!look) return answering(error_response(k_absent, "expected a look of the state, found another name."));
   do_on_worker(
       [scene = news_->scene, look = *look] {
         const std::string bytes = assembly_of(*scene, look);
-        return bytes.empty() ? refusal(k_absent, "this look has no parts.")
+        return bytes.empty() ? error_response(k_absent, "this look has no parts.")
                              : unkept("model/gltf-binary", bytes);
       },
       std::move(answering));
 }
 
-void Reception::get_variant_image(const Asked& asked, Answering answering) {
+void Reception::get_variant_image(const Asked& asked, ResponseCallback answering) {
   constexpr std::string_view k_begin = "/picture/variant/";
   const auto slash = asked.path.find('/', k_begin.size());
   const auto slot =
@@ -293,50 +301,51 @@ void Reception::get_variant_image(const Asked& asked, Answering answering) {
           : decoded(std::string_view(asked.path).substr(k_begin.size(), slash - k_begin.size()));
   const auto variant = name_in(asked.path, asked.path.substr(0, slash) + "/", ".png");
   if (!slot || !variant || !news_)
-    return answering(refusal(k_absent, "expected a slot and a variant of the state, found others."));
+    return answering(error_response(k_absent, "expected a slot and a variant of the state, found others."));
   do_on_worker(
       [images = thumbnails_, scene = news_->scene, slot = *slot, variant = *variant] {
         const auto png = images->png(scene, slot, variant);
-        return png ? unkept("image/png", **png) : refusal(k_absent, png.message());
+        return png ? unkept("image/png", **png) : error_response(k_absent, png.message());
       },
       std::move(answering));
 }
 
-void Reception::post_comment(const Asked& asked, Answering answering) {
-  const auto found = remark_of_body(asked.body);
-  if (!found) return answering(refusal(k_bad, found.message()));
+void Reception::post_comment(const Asked& asked, ResponseCallback answering) {
+  const auto found = parse_comment(asked.body);
+  if (!found) return answering(error_response(k_bad, found.message()));
   auto refused = remark(asked.guest, *found, [answering](const std::string& why, std::uint64_t number) {
-    answering(!why.empty() ? refusal(k_unavailable, why) : json_answer(dumped({{"number", number}})));
+    answering(!why.empty() ? error_response(k_unavailable, why) : json_answer(dumped({{"number", number}})));
   });
   if (refused) answering(std::move(*refused));
 }
 
-void Reception::post_edit(const Asked& asked, Answering answering) {
-  const auto edit = edit_of_body(asked.body);
-  if (!edit) return answering(refusal(k_bad, edit.message()));
+void Reception::post_edit(const Asked& asked, ResponseCallback answering) {
+  const auto edit = parse_edit(asked.body);
+  if (!edit) return answering(error_response(k_bad, edit.message()));
   auto refused = wish(asked.guest, *edit, [answering](const std::string& why, std::uint64_t number) {
-    answering(!why.empty() ? refusal(why == k_late ? k_unavailable : k_bad, why)
+    answering(!why.empty() ? error_response(why == k_late ? k_unavailable : k_bad, why)
                            : json_answer(dumped({{"number", number}})));
   });
   if (refused) answering(std::move(*refused));
 }
 
-void Reception::post_leave(const Asked& asked, Answering answering) {
-  if (const Status empty = empty_body(asked.body); !empty) return answering(refusal(k_bad, empty.message()));
-  guests_.leave(asked.guest.number);
-  HttpAnswer out = json_answer("{}");
+void Reception::post_leave(const Asked& asked, ResponseCallback answering) {
+  if (const Status empty = parse_empty_body(asked.body); !empty)
+    return answering(error_response(k_bad, empty.message()));
+  guests_.end_session(asked.guest.number);
+  HttpResponse out = json_answer("{}");
   out.headers.emplace_back("Set-Cookie", setup_.cookie + "=; Path=/; HttpOnly; SameSite=Strict; Max-Age=0");
   answering(std::move(out));
   update_at(Clock::now());
 }
 
-std::optional<HttpAnswer> Reception::wish(const AuthSessions::Guest& guest,
-                                          const scene::Edit& edit,
-                                          Done done) {
+std::optional<HttpResponse> Reception::wish(const AuthSessions::Guest& guest,
+                                            const scene::Edit& edit,
+                                            Done done) {
   const Role role = role_for(edit.action);
-  if (guest.role < role) return refusal(k_forbidden, may_not(guest, edit.action, role));
+  if (guest.role < role) return error_response(k_forbidden, may_not(guest, edit.action, role));
   if (wishes_.size() >= k_most_wishes)
-    return refusal(k_too_many, "too many edits wait for the session. Try again in a moment.");
+    return error_response(k_too_many, "too many edits wait for the session. Try again in a moment.");
   const auto now = Clock::now();
   wishes_.emplace(++last_wish_, Waiting{std::move(done), now});
   setup_.wish({last_wish_, edit, guest.name, now});
@@ -349,21 +358,21 @@ void Reception::load_comments() {
   if (!*comments_) log_warning("live: {} Nobody can comment.", comments_->message());
 }
 
-std::optional<HttpAnswer> Reception::remark(const AuthSessions::Guest& guest,
-                                            const Remark& remark,
-                                            Done done) {
-  if (guest.role < Role::work) return refusal(k_forbidden, may_not(guest, "comment", Role::work));
-  if (!comments_) return refusal(k_unavailable, "the session has not begun yet.");
-  if (!*comments_) return refusal(k_unavailable, comments_->message());
+std::optional<HttpResponse> Reception::remark(const AuthSessions::Guest& guest,
+                                              const CommentRequest& remark,
+                                              Done done) {
+  if (guest.role < Role::work) return error_response(k_forbidden, may_not(guest, "comment", Role::work));
+  if (!comments_) return error_response(k_unavailable, "the session has not begun yet.");
+  if (!*comments_) return error_response(k_unavailable, comments_->message());
   if (!remark.slot.empty() && !news_->scene->find_slot(remark.slot))
-    return refusal(k_bad, "slot: expected one of the state, found another.");
+    return error_response(k_bad, "slot: expected one of the state, found another.");
   if (!remark.look.empty() && !is_in(news_->state.looks, remark.look))
-    return refusal(k_bad, "look: expected one of the state, found another.");
+    return error_response(k_bad, "look: expected one of the state, found another.");
   auto comment = scene::make_comment(guest.name, remark.look, remark.slot, remark.text);
-  if (!comment) return refusal(k_bad, comment.message());
+  if (!comment) return error_response(k_bad, comment.message());
   std::vector<scene::Comment>& all = **comments_;
   if (all.size() >= scene::k_most_comments)
-    return refusal(k_unavailable, fmt::format("the project keeps {} comments at most.", all.size()));
+    return error_response(k_unavailable, fmt::format("the project keeps {} comments at most.", all.size()));
   all.push_back(std::move(*comment));
   const bool is_taken = setup_.worker->take(
       [this, post = setup_.post, all, done = std::move(done), path = news_->scene->folder / k_comments] {
@@ -372,26 +381,27 @@ std::optional<HttpAnswer> Reception::remark(const AuthSessions::Guest& guest,
       });
   if (!is_taken) {
     all.pop_back();
-    return refusal(k_unavailable, "too much is being saved. Try again in a moment.");
+    return error_response(k_unavailable, "too much is being saved. Try again in a moment.");
   }
   publish();
   return std::nullopt;
 }
 
-std::variant<std::shared_ptr<WsClient>, HttpAnswer> Reception::admit(const HttpRequest& request) {
+std::variant<std::shared_ptr<WsClient>, HttpResponse> Reception::admit(const HttpRequest& request) {
   if (auto refused = refuse(request)) return std::move(*refused);
   const auto guest = guest_of(request);
-  if (!guest) return refusal(k_unpaired, "expected a paired guest. POST /api/pair with a PIN.");
-  if (path_of(request.target) != k_live) return refusal(k_absent, "expected /api/live for a WebSocket.");
+  if (!guest) return error_response(k_unpaired, "expected a paired guest. POST /api/pair with a PIN.");
+  if (path_of(request.target) != k_live)
+    return error_response(k_absent, "expected /api/live for a WebSocket.");
   auto client = std::make_shared<WsClient>();
   client->guest = *guest;
   return client;
 }
 
-std::variant<std::shared_ptr<WebSocketPeer>, HttpAnswer> Reception::accept_web_socket(
+std::variant<std::shared_ptr<WebSocketPeer>, HttpResponse> Reception::accept_web_socket(
     const HttpRequest& request) {
   auto admitted = admit(request);
-  if (auto* refused = std::get_if<HttpAnswer>(&admitted)) return std::move(*refused);
+  if (auto* refused = std::get_if<HttpResponse>(&admitted)) return std::move(*refused);
   return std::make_shared<Connection>(this, std::get<std::shared_ptr<WsClient>>(std::move(admitted)));
 }
 
@@ -402,8 +412,8 @@ void Reception::greet(const std::shared_ptr<WsClient>& client) {
                               {"role", name_of(client->guest.role)},
                               {"name", client->guest.name},
                               {"actions", ordered_json::parse(actions_json())}};
-  client->outbox.answer(dumped(hello));
-  client->outbox.tell_state(state_);
+  client->outbox.add_answer(dumped(hello));
+  client->outbox.set_state(state_);
   publish();
   client->wake();
 }
@@ -426,12 +436,12 @@ void Reception::close_window(const std::shared_ptr<WsClient>& client) {
 }
 
 void Reception::hear_text(const std::shared_ptr<WsClient>& client, std::string_view text) {
-  if (!client->pace.takes(Clock::now())) {
+  if (!client->rate_limit.allows(Clock::now())) {
     client->outbox.end("too many messages");
     return client->wake();
   }
-  const auto message = message_of(text);
-  if (!message) return refuse(client, id_of(text), message.message());
+  const auto message = parse_message(text);
+  if (!message) return refuse(client, parse_message_id(text), message.message());
   std::visit([&](const auto& each) { hear(client, each); }, *message);
 }
 
@@ -440,19 +450,21 @@ void Reception::refuse(const std::shared_ptr<WsClient>& client,
                        const std::string& why) {
   ordered_json out = {{"type", "refused"}, {"id", nullptr}, {"why", why}};
   if (id) out["id"] = *id;
-  client->outbox.answer(dumped(out));
+  client->outbox.add_answer(dumped(out));
   client->wake();
 }
 
 Reception::Done Reception::answer_to(const std::shared_ptr<WsClient>& client, std::uint64_t id) {
   return [this, client, id](const std::string& why, std::uint64_t number) {
     if (!why.empty()) return refuse(client, std::optional(id), why);
-    client->outbox.answer(dumped({{"type", "done"}, {"id", id}, {"number", number}}));
+    client->outbox.add_answer(dumped({{"type", "done"}, {"id", id}, {"number", number}}));
     client->wake();
   };
 }
 
-void Reception::refuse(const std::shared_ptr<WsClient>& client, std::uint64_t id, const HttpAnswer& refused) {
+void Reception::refuse(const std::shared_ptr<WsClient>& client,
+                       std::uint64_t id,
+                       const HttpResponse& refused) {
   refuse(client, std::optional(id), nlohmann::json::parse(refused.body)["error"].get<std::string>());
 }
 
@@ -461,13 +473,13 @@ void Reception::hear(const std::shared_ptr<WsClient>& client, const EditMessage&
   if (refused) refuse(client, message.id, *refused);
 }
 
-void Reception::hear(const std::shared_ptr<WsClient>& client, const RemarkMessage& message) {
-  const auto refused = remark(client->guest, message.remark, answer_to(client, message.id));
+void Reception::hear(const std::shared_ptr<WsClient>& client, const CommentMessage& message) {
+  const auto refused = remark(client->guest, message.comment, answer_to(client, message.id));
   if (refused) refuse(client, message.id, *refused);
 }
 
 void Reception::hear(const std::shared_ptr<WsClient>& client, const ImagesMessage& message) {
-  if (message.room && !setup_.providers.room)
+  if (message.room && !setup_.providers.draw_room)
     return refuse(client, std::nullopt, "this session has no live composite.");
   if (!client->wants_room) client->room_sent.reset();
   client->wants_room = message.room;
@@ -475,13 +487,13 @@ void Reception::hear(const std::shared_ptr<WsClient>& client, const ImagesMessag
   ask_for_room(Clock::now());
 }
 
-void Reception::hear(const std::shared_ptr<WsClient>& client, const SeenMessage& message) {
+void Reception::hear(const std::shared_ptr<WsClient>& client, const ImageShownMessage& message) {
   if (client->room_in_flight == message.image) client->room_in_flight.reset();
   ask_for_room(Clock::now());
 }
 
 void Reception::hear(const std::shared_ptr<WsClient>& client, const WindowMessage& message) {
-  if (message.on && !setup_.providers.look)
+  if (message.on && !setup_.providers.draw_window)
     return refuse(client, std::nullopt, "this session has no window.");
   const auto windows = std::count_if(visitors_.begin(), visitors_.end(), [&](const auto& other) {
     return other != client && !other->device.empty();
@@ -496,13 +508,13 @@ void Reception::hear(const std::shared_ptr<WsClient>& client, const WindowMessag
 }
 
 void Reception::hear_bytes(const std::shared_ptr<WsClient>& client, std::span<const std::uint8_t> bytes) {
-  if (!client->pace.takes(Clock::now())) {
+  if (!client->rate_limit.allows(Clock::now())) {
     client->outbox.end("too many messages");
     return client->wake();
   }
   if (client->device.empty())
     return refuse(client, std::nullopt, "expected a message that begins the window before its pictures.");
-  const auto found = frame_of(bytes);
+  const auto found = parse_frame(bytes);
   if (!found) return refuse(client, std::nullopt, found.message());
   WsClient::Frame frame{found->number, {found->jpeg.begin(), found->jpeg.end()}};
   const bool is_busy = client->frame_in_flight && Clock::now() - client->frame_since < k_longest_look;
@@ -522,11 +534,10 @@ bool Reception::is_eye(const std::shared_ptr<WsClient>& client, Clock::time_poin
 void Reception::look(const std::shared_ptr<WsClient>& client, WsClient::Frame frame) {
   client->frame_in_flight = frame.number;
   client->frame_since = Clock::now();
-  setup_.providers.look(
+  setup_.providers.draw_window(
       {client->device, is_eye(client, client->frame_since) ? client->guest.name : "", client->parts},
       std::move(frame.jpeg),
-      [this, post = setup_.post, weak = std::weak_ptr(client),
-       number = frame.number](ImageProviders::Seen seen) {
+      [this, post = setup_.post, weak = std::weak_ptr(client), number = frame.number](CompositeImage seen) {
         post([this, weak, number, seen = std::move(seen)] {
           if (const auto client = weak.lock()) looked(client, number, seen);
         });
@@ -535,17 +546,17 @@ void Reception::look(const std::shared_ptr<WsClient>& client, WsClient::Frame fr
 
 void Reception::looked(const std::shared_ptr<WsClient>& client,
                        std::uint32_t number,
-                       const ImageProviders::Seen& seen) {
+                       const CompositeImage& seen) {
   if (client->frame_in_flight != number) return;
   client->frame_in_flight.reset();
   if (!client->device.empty()) {
     const auto now = Clock::now();
-    if (seen.p_eye_world && is_eye(client, now)) {
+    if (seen.p_viewpoint_world && is_eye(client, now)) {
       guest_eyes_[client->guest.name] = {client, now};
-      setup_.place(client->guest.name, seen.p_eye_world);
+      setup_.place(client->guest.name, seen.p_viewpoint_world);
     }
-    client->outbox.show(ImageKind::window, std::make_shared<const std::string>(image_message(
-                                               ImageKind::window, number, seen.json, seen.jpeg)));
+    client->outbox.set_image(ImageKind::window, std::make_shared<const std::string>(image_message(
+                                                    ImageKind::window, number, seen.json, seen.jpeg)));
     client->wake();
   }
   if (client->frame_waiting) look(client, *std::exchange(client->frame_waiting, std::nullopt));
@@ -565,12 +576,12 @@ void Reception::ask_for_room(Clock::time_point now) {
   if (!is_wanted || room_is_asked_) return;
   room_is_asked_ = true;
   room_asked_at_ = now;
-  setup_.providers.room([this, post = setup_.post](ImageProviders::Seen seen) {
+  setup_.providers.draw_room([this, post = setup_.post](CompositeImage seen) {
     post([this, seen = std::move(seen)] { room_came(seen); });
   });
 }
 
-void Reception::room_came(ImageProviders::Seen seen) {
+void Reception::room_came(CompositeImage seen) {
   room_is_asked_ = false;
   room_came_at_ = Clock::now();
   const auto took = room_came_at_ - room_asked_at_;
@@ -588,15 +599,15 @@ void Reception::room_came(ImageProviders::Seen seen) {
 void Reception::show_room(const std::shared_ptr<WsClient>& client) {
   client->room_in_flight = client->room_sent = room_number_;
   const bool may_see = may_see_room(client->guest) && client->guest.role >= room_role_;
-  client->outbox.show(ImageKind::room,
-                      may_see ? room_message_
-                              : std::make_shared<const std::string>(image_message(
-                                    ImageKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
+  client->outbox.set_image(ImageKind::room,
+                           may_see ? room_message_
+                                   : std::make_shared<const std::string>(image_message(
+                                         ImageKind::room, room_number_, dumped({{"why", k_hidden}}), {})));
   client->wake();
 }
 
 void Reception::take(SessionNews news) {
-  if (news_) news.state = steadied(std::move(news.state), news_->state);
+  if (news_) news.state = without_jitter(std::move(news.state), news_->state);
   const std::vector<Outcome> outcomes = std::exchange(news.outcomes, {});
   news_ = std::move(news);
   if (!comments_) load_comments();
@@ -643,7 +654,7 @@ void Reception::publish() {
   message.update(state);
   state_ = std::make_shared<const std::string>(dumped(message));
   for (const auto& client : visitors_) {
-    client->outbox.tell_state(state_);
+    client->outbox.set_state(state_);
     client->wake();
   }
 }
@@ -651,7 +662,7 @@ void Reception::publish() {
 void Reception::update_at(Clock::time_point now) {
   setup_.watched(guests_.count() > 0);
   for (const auto& client : visitors_) {
-    if (guests_.lives(client->guest.number, now)) continue;
+    if (guests_.is_valid(client->guest.number, now)) continue;
     client->outbox.end("the session is over. Pair again.");
     client->wake();
   }

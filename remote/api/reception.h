@@ -79,7 +79,8 @@ class Reception : public HttpHandler {
     WorkerThread* worker = nullptr;
     std::function<void(Wish)> wish;  ///< to the session
     /// To the session: where a guest's tablet looks from, by each image; nullopt: its window is closed.
-    std::function<void(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world)> place;
+    std::function<void(const std::string& guest, const std::optional<Eigen::Vector3d>& p_viewpoint_world)>
+        place;
     std::function<void(bool)> watched;                ///< whether anybody is paired
     std::function<void(std::function<void()>)> post;  ///< runs it on this object's thread; from any thread
   };
@@ -87,11 +88,11 @@ class Reception : public HttpHandler {
 
   const AuthSessions& guests() const { return guests_; }
 
-  void handle_request(const HttpRequest& request, Answering answering) override;
-  std::variant<std::shared_ptr<WebSocketPeer>, HttpAnswer> accept_web_socket(
+  void handle_request(const HttpRequest& request, ResponseCallback answering) override;
+  std::variant<std::shared_ptr<WebSocketPeer>, HttpResponse> accept_web_socket(
       const HttpRequest& request) override;
   /// For a request of /api/live: who comes in, or why not.
-  std::variant<std::shared_ptr<WsClient>, HttpAnswer> admit(const HttpRequest& request);
+  std::variant<std::shared_ptr<WsClient>, HttpResponse> admit(const HttpRequest& request);
   /// Once the visitor's `wake` is there.
   void greet(const std::shared_ptr<WsClient>& client);
   void hear_text(const std::shared_ptr<WsClient>& client, std::string_view text);
@@ -121,35 +122,37 @@ class Reception : public HttpHandler {
   struct Route;
   class Connection;
   static const std::vector<Route>& routes();
-  std::optional<HttpAnswer> refuse(const HttpRequest& request) const;
+  std::optional<HttpResponse> refuse(const HttpRequest& request) const;
   std::optional<AuthSessions::Guest> guest_of(const HttpRequest& request) const;
-  HttpAnswer file(const HttpRequest& request, const std::string& path) const;
-  HttpAnswer pair(const HttpRequest& request);
+  HttpResponse file(const HttpRequest& request, const std::string& path) const;
+  HttpResponse pair(const HttpRequest& request);
 
-  void get_state(const Asked& asked, Answering answering);
-  void get_actions(const Asked& asked, Answering answering);
-  void get_room(const Asked& asked, Answering answering);
-  void get_projector(const Asked& asked, Answering answering);
-  void get_look_image(const Asked& asked, Answering answering);
-  void get_look_assembly(const Asked& asked, Answering answering);
-  void get_variant_image(const Asked& asked, Answering answering);
-  void do_on_worker(std::function<HttpAnswer()> job, Answering answering);
-  void post_comment(const Asked& asked, Answering answering);
-  void post_edit(const Asked& asked, Answering answering);
-  void post_leave(const Asked& asked, Answering answering);
+  void get_state(const Asked& asked, ResponseCallback answering);
+  void get_actions(const Asked& asked, ResponseCallback answering);
+  void get_room(const Asked& asked, ResponseCallback answering);
+  void get_projector(const Asked& asked, ResponseCallback answering);
+  void get_look_image(const Asked& asked, ResponseCallback answering);
+  void get_look_assembly(const Asked& asked, ResponseCallback answering);
+  void get_variant_image(const Asked& asked, ResponseCallback answering);
+  void do_on_worker(std::function<HttpResponse()> job, ResponseCallback answering);
+  void post_comment(const Asked& asked, ResponseCallback answering);
+  void post_edit(const Asked& asked, ResponseCallback answering);
+  void post_leave(const Asked& asked, ResponseCallback answering);
 
   using Done = std::function<void(const std::string& why, std::uint64_t number)>;
   /// `done` is called when the state has it; why it cannot be tried at all.
-  std::optional<HttpAnswer> wish(const AuthSessions::Guest& guest, const scene::Edit& edit, Done done);
+  std::optional<HttpResponse> wish(const AuthSessions::Guest& guest, const scene::Edit& edit, Done done);
   /// The same for a comment: `done` is called when it is saved.
-  std::optional<HttpAnswer> remark(const AuthSessions::Guest& guest, const Remark& remark, Done done);
+  std::optional<HttpResponse> remark(const AuthSessions::Guest& guest,
+                                     const CommentRequest& remark,
+                                     Done done);
   void load_comments();
   Done answer_to(const std::shared_ptr<WsClient>& client, std::uint64_t id);
-  void refuse(const std::shared_ptr<WsClient>& client, std::uint64_t id, const HttpAnswer& refused);
+  void refuse(const std::shared_ptr<WsClient>& client, std::uint64_t id, const HttpResponse& refused);
   void hear(const std::shared_ptr<WsClient>& client, const EditMessage& message);
-  void hear(const std::shared_ptr<WsClient>& client, const RemarkMessage& message);
+  void hear(const std::shared_ptr<WsClient>& client, const CommentMessage& message);
   void hear(const std::shared_ptr<WsClient>& client, const ImagesMessage& message);
-  void hear(const std::shared_ptr<WsClient>& client, const SeenMessage& message);
+  void hear(const std::shared_ptr<WsClient>& client, const ImageShownMessage& message);
   void hear(const std::shared_ptr<WsClient>& client, const WindowMessage& message);
   void refuse(const std::shared_ptr<WsClient>& client,
               std::optional<std::uint64_t> id,
@@ -157,11 +160,9 @@ class Reception : public HttpHandler {
   void look(const std::shared_ptr<WsClient>& client, WsClient::Frame frame);
   void close_window(const std::shared_ptr<WsClient>& client);
   bool is_eye(const std::shared_ptr<WsClient>& client, Clock::time_point now) const;
-  void looked(const std::shared_ptr<WsClient>& client,
-              std::uint32_t number,
-              const ImageProviders::Seen& seen);
+  void looked(const std::shared_ptr<WsClient>& client, std::uint32_t number, const CompositeImage& seen);
   void ask_for_room(Clock::time_point now);
-  void room_came(ImageProviders::Seen seen);
+  void room_came(CompositeImage seen);
   void show_room(const std::shared_ptr<WsClient>& client);
   bool may_see_room(const AuthSessions::Guest& guest) const;
   void publish();
@@ -188,7 +189,7 @@ class Reception : public HttpHandler {
   std::optional<Result<std::vector<scene::Comment>>> comments_;  // none before the first news
   bool room_is_asked_ = false;
   Clock::time_point room_asked_at_, room_came_at_, room_next_at_;
-  ImageProviders::Seen room_;
+  CompositeImage room_;
   Role room_role_ = Role::look;  // the least that may see it, also when nothing is hidden any more
   std::shared_ptr<const std::string> room_message_;
   std::uint32_t room_number_ = 0;

@@ -12,9 +12,9 @@ namespace limn::remote {
 namespace {
 
 constexpr double k_same_m = 0.05e-3, k_same_rad = 0.03 * std::numbers::pi / 180;
-constexpr std::size_t k_most_notes = 20;
+constexpr std::size_t k_max_notes = 20;
 
-std::string sight_of(const std::vector<Track>& tracks, const std::string& body) {
+std::string tracking_name(const std::vector<Track>& tracks, const std::string& body) {
   for (const Track& track : tracks) {
     if (track.body != body || track.tracking == TrackingState::lost) continue;
     return track.tracking == TrackingState::measured ? "seen" : "carried on";
@@ -22,7 +22,7 @@ std::string sight_of(const std::vector<Track>& tracks, const std::string& body) 
   return "lost";
 }
 
-SessionState::Slot slot_of(const apps::Session& session, std::size_t index) {
+SessionState::Slot slot_state(const apps::Session& session, std::size_t index) {
   const scene::Scene& scene = session.setup().scene;
   const scene::Slot& slot = scene.slots[index];
   const scene::ShowState::Slot& staged = session.show_state().slots[index];
@@ -35,7 +35,7 @@ SessionState::Slot slot_of(const apps::Session& session, std::size_t index) {
   }
   out.nudge_mm = 1e3 * staged.nudge;
   out.is_held = staged.pin || !staged.nudge.isZero();
-  out.sight = sight_of(session.painted().tracks, slot.name);
+  out.tracking = tracking_name(session.painted().tracks, slot.name);
   out.marker = scene::slot_marker(scene, session.show_state(), index).text();
   out.material = scene::format_material_override(staged.material);
   const scene::PosedScene& posed = session.painted().posed;
@@ -45,7 +45,7 @@ SessionState::Slot slot_of(const apps::Session& session, std::size_t index) {
   return out;
 }
 
-std::string light_of(const scene::Scene& scene, const scene::ShowState& show_state) {
+std::string light_text(const scene::Scene& scene, const scene::ShowState& show_state) {
   if (!show_state.light || show_state.light == scene.light) return {};
   const auto numbers = scene::room_light_numbers(*show_state.light, show_state.d_front_world);
   if (!numbers) return "other";
@@ -63,7 +63,7 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
       {"variants", slot.variants},
       {"nudge_mm", {rounded(slot.nudge_mm.x()), rounded(slot.nudge_mm.y()), rounded(slot.nudge_mm.z())}},
       {"is_held", slot.is_held},
-      {"sight", slot.sight},
+      {"sight", slot.tracking},
       {"marker", slot.marker},
       {"material", slot.material},
       {"dropped", slot.dropped}};
@@ -73,15 +73,15 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
 
 }  // namespace
 
-SessionState state_of(const apps::Session& session,
-                      const apps::Telemetry& telemetry,
-                      const apps::DeviceHealth& health,
-                      Stamp begun_at) {
+SessionState session_state(const apps::Session& session,
+                           const apps::Telemetry& telemetry,
+                           const apps::DeviceHealth& health,
+                           Stamp begun_at) {
   const scene::Scene& scene = session.setup().scene;
   const scene::ShowState& show_state = session.show_state();
   SessionState out;
-  for (std::size_t i = 0; i < scene.slots.size(); ++i) out.slots.push_back(slot_of(session, i));
-  if (scene.prototype) out.prototype = sight_of(session.painted().tracks, "prototype");
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) out.slots.push_back(slot_state(session, i));
+  if (scene.prototype) out.prototype = tracking_name(session.painted().tracks, "prototype");
   for (const scene::Look& look : show_state.looks) out.looks.push_back(look.name);
   out.look = show_state.look;
   out.other_look = show_state.other_look;
@@ -94,7 +94,7 @@ SessionState state_of(const apps::Session& session,
   out.split_mm = show_state.split_mm;
   out.screen = scene::screen_names()[static_cast<std::size_t>(show_state.screen)];
   out.outputs = show_state.screens;
-  out.light = light_of(scene, show_state);
+  out.light = light_text(scene, show_state);
   out.viewer = show_state.viewer;
   out.follows = session.painted().follows;
   out.repair = session.recalibration_progress();
@@ -105,16 +105,16 @@ SessionState state_of(const apps::Session& session,
     out.waiting.push_back(loose.marker.text());
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, begun_at);
-  for (std::size_t i = notes.size() > k_most_notes ? notes.size() - k_most_notes : 0; i < notes.size(); ++i)
+  for (std::size_t i = notes.size() > k_max_notes ? notes.size() - k_max_notes : 0; i < notes.size(); ++i)
     out.notes.push_back({notes[i].first - begun_s, notes[i].second});
   out.last_edit = session.last_edit();
   return out;
 }
 
-SessionState steadied(SessionState state, const SessionState& told) {
-  for (std::size_t i = 0; i < std::min(state.slots.size(), told.slots.size()); ++i) {
+SessionState without_jitter(SessionState state, const SessionState& published) {
+  for (std::size_t i = 0; i < std::min(state.slots.size(), published.slots.size()); ++i) {
     auto& pose = state.slots[i].prototype_from_part;
-    const auto& before = told.slots[i].prototype_from_part;
+    const auto& before = published.slots[i].prototype_from_part;
     if (pose && before && (pose->translation - before->translation).norm() <= k_same_m &&
         angle_between(pose->rotation, before->rotation) <= k_same_rad)
       pose = before;

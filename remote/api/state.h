@@ -13,14 +13,14 @@
 
 namespace limn::remote {
 
-/// What a guest of the remote is told of a session, but for who is there: "The state" of docs/remote.md.
+/// What a guest of the remote is published of a session, but for who is there: "The state" of docs/remote.md.
 struct SessionState {
   struct Slot {
     std::string name, variant;
     std::vector<std::string> variants;
     Eigen::Vector3d nudge_mm = Eigen::Vector3d::Zero();
     bool is_held = false;
-    std::string sight;
+    std::string tracking;
     std::string marker;
     std::string material;  ///< as the action takes it; empty: as its file says
     std::vector<std::string> dropped;
@@ -31,7 +31,7 @@ struct SessionState {
     std::string text;
   };
   std::vector<Slot> slots;
-  std::string prototype;  ///< its sight; empty: the scene has none
+  std::string prototype;  ///< its tracking; empty: the scene has none
   std::vector<std::string> looks;
   std::string look, other_look, deleted_look;
   bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
@@ -50,13 +50,14 @@ struct SessionState {
 };
 
 /// `begun_at`: of the session, from which notes are dated.
-SessionState state_of(const apps::Session& session,
-                      const apps::Telemetry& telemetry,
-                      const apps::DeviceHealth& health,
-                      Stamp begun_at);
+SessionState session_state(const apps::Session& session,
+                           const apps::Telemetry& telemetry,
+                           const apps::DeviceHealth& health,
+                           Stamp begun_at);
 
-/// Poses that differ from `told` by what a tracker trembles (0.05 mm, 0.03 degrees) as they were told.
-SessionState steadied(SessionState state, const SessionState& told);
+/// Poses that differ from `published` by what a tracker trembles (0.05 mm, 0.03 degrees) as they were
+/// published.
+SessionState without_jitter(SessionState state, const SessionState& published);
 
 /// Its members of the message, but for number, last_edit, guests and comments.
 nlohmann::ordered_json to_json(const SessionState& state);

@@ -5,14 +5,14 @@
 
 namespace limn::remote {
 
-void Outbox::answer(std::string text) {
+void Outbox::add_answer(std::string text) {
   answers_.push_back(std::move(text));
-  if (answers_.size() <= k_most_answers) return;
+  if (answers_.size() <= k_max_answers) return;
   answers_.clear();
   end("too many answers were not read");
 }
 
-void Outbox::show(ImageKind kind, std::shared_ptr<const std::string> bytes) {
+void Outbox::set_image(ImageKind kind, std::shared_ptr<const std::string> bytes) {
   (kind == ImageKind::room ? room_ : window_) = std::move(bytes);
 }
 
@@ -23,7 +23,7 @@ void Outbox::end(const std::string& why) {
   bye_ = std::make_shared<const std::string>(bye.dump());
 }
 
-std::optional<Outgoing> Outbox::next() {
+std::optional<Outgoing> Outbox::next_message() {
   if (bye_) return Outgoing{std::exchange(bye_, nullptr)};
   if (is_ending_) return std::nullopt;
   if (!answers_.empty()) {
@@ -37,7 +37,7 @@ std::optional<Outgoing> Outbox::next() {
   return std::nullopt;
 }
 
-bool Pace::takes(Time now) {
+bool RateLimit::allows(Time now) {
   if (last_)
     left_ = std::min(at_once_, left_ + per_second_ * std::chrono::duration<double>(now - *last_).count());
   last_ = now;

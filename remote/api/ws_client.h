@@ -16,7 +16,7 @@
 namespace limn::remote {
 
 /// Answers to messages that may wait for a guest who does not read; with one more the connection ends.
-constexpr std::size_t k_most_answers = 512;
+constexpr std::size_t k_max_answers = 512;
 /// Messages of a guest: so many a second, and so many at once.
 constexpr double k_messages_per_s = 120, k_messages_at_once = 240;
 
@@ -24,14 +24,14 @@ constexpr double k_messages_per_s = 120, k_messages_at_once = 240;
 /// costs no memory and gets no old news.
 class Outbox {
  public:
-  void answer(std::string text);
-  void tell_state(std::shared_ptr<const std::string> text) { state_ = std::move(text); }
-  void show(ImageKind kind, std::shared_ptr<const std::string> bytes);
+  void add_answer(std::string text);
+  void set_state(std::shared_ptr<const std::string> text) { state_ = std::move(text); }
+  void set_image(ImageKind kind, std::shared_ptr<const std::string> bytes);
   /// The last thing that is said; then the connection ends. Only the first one counts.
   void end(const std::string& why);
 
   /// What is to be written next; nullopt: nothing for now, or, when is_over(), for ever.
-  std::optional<Outgoing> next();
+  std::optional<Outgoing> next_message();
   bool is_over() const { return is_ending_ && !bye_; }
 
  private:
@@ -42,12 +42,12 @@ class Outbox {
 };
 
 /// So many things a second, and so many at once.
-class Pace {
+class RateLimit {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  Pace(double per_second, double at_once) : per_second_(per_second), at_once_(at_once), left_(at_once) {}
+  RateLimit(double per_second, double at_once) : per_second_(per_second), at_once_(at_once), left_(at_once) {}
   /// Whether one more is within it.
-  bool takes(Time now);
+  bool allows(Time now);
 
  private:
   double per_second_, at_once_, left_;
@@ -59,7 +59,7 @@ struct WsClient {
   AuthSessions::Guest guest;
   Outbox outbox;
   std::function<void()> wake;  ///< of the connection: something was put into the outbox
-  Pace pace{k_messages_per_s, k_messages_at_once};
+  RateLimit rate_limit{k_messages_per_s, k_messages_at_once};
 
   bool wants_room = false;
   std::optional<std::uint32_t> room_in_flight;  ///< an image that was sent and not seen yet

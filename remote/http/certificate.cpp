@@ -114,7 +114,7 @@ std::string permitted_names(const std::vector<std::string>& hosts) {
 }
 
 // A key and its certificate, without extensions, not yet signed.
-Pair begun(const std::string& name, int days) {
+Pair unsigned_pair(const std::string& name, int days) {
   Pair out{Key(EVP_EC_gen("P-256")), X509Certificate(X509_new())};
   X509* certificate = out.certificate.get();
   std::array<unsigned char, 16> serial{};
@@ -137,10 +137,10 @@ void sign(const Pair& authority, X509* certificate) {
   LIMN_CHECK(X509_sign(certificate, authority.key.get(), EVP_sha256()) > 0);
 }
 
-Pair authority_for(const std::vector<std::string>& hosts) {
+Pair make_authority(const std::vector<std::string>& hosts) {
   constexpr std::size_t k_most = 40;  // letters of the machine's name; a certificate's has 64 at most
-  const std::string machine = own_name().substr(0, k_most);
-  Pair out = begun(machine.empty() ? "Limn" : "Limn on " + machine, k_authority_days);
+  const std::string machine = own_host_name().substr(0, k_most);
+  Pair out = unsigned_pair(machine.empty() ? "Limn" : "Limn on " + machine, k_authority_days);
   X509* certificate = out.certificate.get();
   add_extension(certificate, certificate, NID_basic_constraints, "critical,CA:TRUE,pathlen:0");
   add_extension(certificate, certificate, NID_key_usage, "critical,keyCertSign");
@@ -150,8 +150,8 @@ Pair authority_for(const std::vector<std::string>& hosts) {
   return out;
 }
 
-Pair certified(const Pair& authority, const std::vector<std::string>& hosts) {
-  Pair out = begun("Limn", k_certificate_days);
+Pair make_server_pair(const Pair& authority, const std::vector<std::string>& hosts) {
+  Pair out = unsigned_pair("Limn", k_certificate_days);
   X509 *certificate = out.certificate.get(), *issuer = authority.certificate.get();
   add_extension(certificate, issuer, NID_subject_alt_name, alternative_names(hosts));
   add_extension(certificate, issuer, NID_basic_constraints, "critical,CA:FALSE");
@@ -232,7 +232,7 @@ Status check_is_secret(const fs::path& path) {
 }
 
 // The key and the certificate of a file; nullopt: there is none.
-Result<std::optional<Pair>> read_from(const fs::path& path) {
+Result<std::optional<Pair>> read_pair(const fs::path& path) {
   LIMN_TRY_STATUS(check_is_secret(path));
   std::error_code ignored;
   if (!fs::exists(path, ignored)) return std::optional<Pair>();
@@ -253,19 +253,20 @@ Result<std::optional<Pair>> read_from(const fs::path& path) {
 
 }  // namespace
 
-Result<Certificate> certificate_in(const fs::path& folder, const std::vector<std::string>& hosts) {
+Result<Certificate> load_or_create_certificate(const fs::path& folder,
+                                               const std::vector<std::string>& hosts) {
   LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY(std::optional<Pair> authority, read_from(folder / k_authority_file));
-  LIMN_TRY(std::optional<Pair> own, read_from(folder / k_file));
+  LIMN_TRY(std::optional<Pair> authority, read_pair(folder / k_authority_file));
+  LIMN_TRY(std::optional<Pair> own, read_pair(folder / k_file));
   if (authority && ends_within(k_certificate_days, authority->certificate.get())) authority.reset();
   const bool is_known = authority && own && is_signed_by(*authority, own->certificate.get()) &&
                         is_for_all(own->certificate.get(), hosts) &&
                         !ends_within(k_renewed_days_before, own->certificate.get());
   if (!is_known) {
-    if (authority) own = certified(*authority, hosts);
+    if (authority) own = make_server_pair(*authority, hosts);
     if (!authority || !may_sign(*authority, own->certificate.get())) {
-      authority = authority_for(hosts);
-      own = certified(*authority, hosts);
+      authority = make_authority(hosts);
+      own = make_server_pair(*authority, hosts);
       LIMN_TRY_STATUS(write_secret(folder / k_authority_file, pem_of(*authority)));
     }
     LIMN_TRY_STATUS(write_secret(folder / k_file, pem_of(*own)));

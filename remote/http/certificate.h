@@ -28,7 +28,7 @@ struct Certificate {
 /// made for alone (RFC 5280, 4.2.1.10). Each is made when there is none, when it is not for one of the hosts,
 /// or when it ends soon; a file then is either old or complete, and nobody but its owner can read it. Error:
 /// somebody else can, or a file holds something else.
-Result<Certificate> certificate_in(const std::filesystem::path& folder,
-                                   const std::vector<std::string>& hosts);
+Result<Certificate> load_or_create_certificate(const std::filesystem::path& folder,
+                                               const std::vector<std::string>& hosts);
 
 }  // namespace limn::remote

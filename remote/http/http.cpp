@@ -4,12 +4,12 @@
 
 namespace limn::remote {
 
-HttpAnswer refusal(int status, const std::string& why) {
+HttpResponse error_response(int status, const std::string& why) {
   const nlohmann::json body = {{"error", why}};
   return {status, "application/json", body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
 }
 
-const std::vector<std::pair<std::string, std::string>>& guarding_headers() {
+const std::vector<std::pair<std::string, std::string>>& security_headers() {
   static const std::vector<std::pair<std::string, std::string>> all = {
       {"Content-Security-Policy",
        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "

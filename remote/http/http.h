@@ -19,7 +19,7 @@ struct HttpRequest {
   std::string address;  ///< of who asks, numeric
 };
 
-struct HttpAnswer {
+struct HttpResponse {
   int status = 200;
   std::string type;  ///< MIME; empty: no body
   std::string body;
@@ -27,13 +27,13 @@ struct HttpAnswer {
 };
 
 /// Takes an answer, once, from any thread.
-using Answering = std::function<void(HttpAnswer)>;
+using ResponseCallback = std::function<void(HttpResponse)>;
 
 /// {"error": "…"} with a status.
-HttpAnswer refusal(int status, const std::string& why);
+HttpResponse error_response(int status, const std::string& why);
 
 /// On every answer: what a browser may do with it, and what it must not.
-const std::vector<std::pair<std::string, std::string>>& guarding_headers();
+const std::vector<std::pair<std::string, std::string>>& security_headers();
 
 /// The path of a target, without query; nullopt: it does not begin with "/".
 std::optional<std::string> path_of(std::string_view target);

@@ -48,9 +48,9 @@ class HttpHandler {
   virtual ~HttpHandler() = default;
 
   /// Calls `answering` exactly once, perhaps later and on another thread.
-  virtual void handle_request(const HttpRequest& request, Answering answering) = 0;
-  /// Handles a request for an upgrade to a WebSocket: the peer of the new connection, or a refusal.
-  virtual std::variant<std::shared_ptr<WebSocketPeer>, HttpAnswer> accept_web_socket(
+  virtual void handle_request(const HttpRequest& request, ResponseCallback answering) = 0;
+  /// Handles a request for an upgrade to a WebSocket: the peer of the new connection, or a error_response.
+  virtual std::variant<std::shared_ptr<WebSocketPeer>, HttpResponse> accept_web_socket(
       const HttpRequest& request) = 0;
   /// Called about forty times a second, for everything that depends on time.
   virtual void update_at(std::chrono::steady_clock::time_point now) = 0;

@@ -101,13 +101,13 @@ struct SharedState {
 
   // Connections that wait for an answer. Other threads hold only a number, so that a connection is used and
   // destroyed on the network's thread alone.
-  std::map<std::uint64_t, Answering> waiting;
+  std::map<std::uint64_t, ResponseCallback> waiting;
   std::uint64_t last_waiting = 0;
 
   // The same function for any thread: it runs `answering` on the network's thread.
-  Answering answering_on_this_thread(Answering answering) {
+  ResponseCallback answering_on_this_thread(ResponseCallback answering) {
     waiting.emplace(++last_waiting, std::move(answering));
-    return [this, number = last_waiting](HttpAnswer answer) {
+    return [this, number = last_waiting](HttpResponse answer) {
       asio::post(io, [this, number, answer = std::move(answer)]() mutable {
         const auto found = waiting.extract(number);
         if (!found.empty()) found.mapped()(std::move(answer));
@@ -269,7 +269,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
  private:
   void begin() {
     if (slot_->kind() == ConnectionSlots::Kind::rejected)
-      return write_last(refusal(503, "too many connections. Try again in a moment."));
+      return write_last(error_response(503, "too many connections. Try again in a moment."));
     read();
   }
 
@@ -296,16 +296,17 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
 
   void reject(Problem problem) {
     const bool has_begun = parser_->got_some();
-    if (is_late_) return has_begun ? write_last(refusal(408, "expected a whole request sooner.")) : close();
+    if (is_late_)
+      return has_begun ? write_last(error_response(408, "expected a whole request sooner.")) : close();
     if (problem == http::error::body_limit)
-      return write_last(
-          refusal(413, fmt::format("expected a body of at most {} bytes.", shared_->limits.body_bytes)));
+      return write_last(error_response(
+          413, fmt::format("expected a body of at most {} bytes.", shared_->limits.body_bytes)));
     if (problem == http::error::header_limit || problem == http::error::buffer_overflow)
-      return write_last(
-          refusal(431, fmt::format("expected headers of at most {} bytes.", shared_->limits.header_bytes)));
+      return write_last(error_response(
+          431, fmt::format("expected headers of at most {} bytes.", shared_->limits.header_bytes)));
     if (problem.category() == http::make_error_code(http::error::bad_method).category() &&
         problem != http::error::end_of_stream && problem != http::error::partial_message)
-      return write_last(refusal(400, "expected a request of HTTP 1.1."));
+      return write_last(error_response(400, "expected a request of HTTP 1.1."));
     close();
   }
 
@@ -334,26 +335,26 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
     keeps_alive_ = parser_->get().keep_alive();
     if (asked.is_upgrade) {
       auto accepted = shared_->handler->accept_web_socket(asked);
-      if (auto* refused = std::get_if<HttpAnswer>(&accepted)) return write_last(std::move(*refused));
+      if (auto* refused = std::get_if<HttpResponse>(&accepted)) return write_last(std::move(*refused));
       const auto socket =
           std::make_shared<Socket<Stream>>(std::move(stream_), shared_, std::move(slot_),
                                            std::move(std::get<std::shared_ptr<WebSocketPeer>>(accepted)));
       return socket->run(parser_->get());
     }
     shared_->handler->handle_request(
-        asked, shared_->answering_on_this_thread([self = this->shared_from_this()](HttpAnswer answer) {
+        asked, shared_->answering_on_this_thread([self = this->shared_from_this()](HttpResponse answer) {
           self->write(std::move(answer), self->keeps_alive_);
         }));
   }
 
-  void write_last(HttpAnswer answer) { write(std::move(answer), false); }
+  void write_last(HttpResponse answer) { write(std::move(answer), false); }
 
-  void write(HttpAnswer answer, bool keeps_alive) {
+  void write(HttpResponse answer, bool keeps_alive) {
     response_.emplace();
     response_->version(11);
     response_->result(static_cast<unsigned>(answer.status));
     response_->keep_alive(keeps_alive);
-    for (const auto& [name, value] : guarding_headers()) response_->set(name, value);
+    for (const auto& [name, value] : security_headers()) response_->set(name, value);
     if (!answer.type.empty()) response_->set(http::field::content_type, answer.type);
     if (answer.status >= 400) response_->set(http::field::cache_control, "no-store");
     for (const auto& [name, value] : answer.headers) response_->set(name, value);

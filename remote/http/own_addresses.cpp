@@ -38,7 +38,7 @@ bool is_loopback(const std::string& address) {
   return inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_LOOPBACK(&six);
 }
 
-bool is_any(const std::string& address) {
+bool is_unspecified(const std::string& address) {
   in_addr four{};
   in6_addr six{};
   if (inet_pton(AF_INET, address.c_str(), &four) == 1) return four.s_addr == INADDR_ANY;
@@ -62,7 +62,7 @@ std::vector<std::string> own_addresses() {
   return out;
 }
 
-std::string own_name() {
+std::string own_host_name() {
   std::array<char, 256> name{};
   return gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }

@@ -50,7 +50,7 @@ class Stage {
   Stage() : context_(device::GlContext::create().value()) {
     sim::World world =
         sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
-    static_cast<void>(apps::scale_resolution(k_resolution, &world.rig).ok());
+    static_cast<void>(scale_resolution(k_resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_ = std::make_unique<sim::VirtualRig>(
@@ -70,8 +70,8 @@ class Stage {
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
     if (!frames.empty()) session_->take(perception_->watch(frames), ++moments_);
-    server->hear(&*session_, rig_->now());
-    server->tell(*session_, *telemetry_, health_, rig_->now());
+    server->apply_edits(&*session_, rig_->now());
+    server->publish_state(*session_, *telemetry_, health_, rig_->now());
     session_->paint(rig_->now(), shifted(rig_->now(), k_lag_s));
     const double took_ms = ms_since(begun);
     for (std::size_t i = 0; i < setup_.rig.projectors.size(); ++i)
@@ -113,7 +113,7 @@ class AuthSessions {
 
  private:
   void attend(int number) {
-    apps::step_back(19);
+    step_back(19);
     RemoteClient& socket = *sockets_[static_cast<std::size_t>(number)];
     while (!is_over_) {
       if (number == 0) edit(&socket);

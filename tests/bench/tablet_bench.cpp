@@ -83,10 +83,10 @@ struct Room {
   }
 };
 
-remote::TabletView::Seen look(remote::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
-  std::promise<remote::TabletView::Seen> answered;
-  tablet_view->look({k_device}, jpeg,
-                    [&](remote::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+remote::CompositeImage look(remote::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
+  std::promise<remote::CompositeImage> answered;
+  tablet_view->draw_window({k_device}, jpeg,
+                           [&](remote::CompositeImage seen) { answered.set_value(std::move(seen)); });
   return answered.get_future().get();
 }
 
@@ -144,7 +144,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, remote::Tabl
     for (std::size_t i = 0; i < shots.size(); ++i) {
       const TabletShot& shot = shots[i];
       room->session.take(moments[i], room->moments);
-      tablet_view->know(room->session);
+      tablet_view->update_session(room->session);
       const double begun_processor = processor_ms(), begun = now_ms();
       const cv::Mat image = device::decode_jpeg(shot.jpeg).value();
       const double decoded = now_ms();
@@ -156,7 +156,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, remote::Tabl
       (void)device::encode_jpeg(image, k_quality);
       const double encoded = now_ms();
       const double asked_processor = processor_ms(), asked = now_ms();
-      const remote::TabletView::Seen seen = look(tablet_view, shot.jpeg);
+      const remote::CompositeImage seen = look(tablet_view, shot.jpeg);
       const double answered_processor = processor_ms(), answered = now_ms();
       const json said = json::parse(seen.json);
       LIMN_CHECK(said["sees"] != "nothing");
@@ -215,7 +215,7 @@ void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, remo
       const double begun = now_ms();
       room->session.paint(room->rig.now(), shifted(room->rig.now(), 0.04));
       const double painted = now_ms();
-      tablet_view->know(room->session);
+      tablet_view->update_session(room->session);
       know.push_back(now_ms() - painted);
       if (i > 1) (turn % 2 == 1 ? with : without).push_back(now_ms() - begun);
     }
@@ -223,7 +223,8 @@ void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, remo
     guest.join();
   }
   fmt::print(
-      "projector loop: {:.1f} ms a picture, {:.1f} with a window open ({:+.1f} %, at most 10); know() {:.4f} "
+      "projector loop: {:.1f} ms a picture, {:.1f} with a window open ({:+.1f} %, at most 10); "
+      "update_session() {:.4f} "
       "ms\n",
       median(without), median(with), 100 * (median(with) / median(without) - 1), median(know));
 }
@@ -259,7 +260,7 @@ int main(int argc, char** argv) {
     const auto tablet_view = remote::TabletView::create(room.setup, folder).value();
     fmt::print("{} pictures of {}x{}, seed {}; {}\n", shots.size(), k_width, k_height, seed,
                room.context.description());
-    tablet_view->know(room.session);
+    tablet_view->update_session(room.session);
     std::thread([&] { print_window(shots, &room, tablet_view.get()); }).join();
     print_projector_loop(shots, &room, tablet_view.get());
   }

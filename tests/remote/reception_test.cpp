@@ -25,7 +25,7 @@ class AReception : public testing::Test {
     out.cookie = "limn";
     out.watched = [](bool) {};
     out.post = [](const std::function<void()>& job) { job(); };
-    out.providers.room = [this](ImageProviders::Answer answer) { asked_.push_back(std::move(answer)); };
+    out.providers.draw_room = [this](ImageCallback answer) { asked_.push_back(std::move(answer)); };
     return out;
   }
 
@@ -36,7 +36,7 @@ class AReception : public testing::Test {
     request.host = "localhost";
     request.content_type = "application/json";
     request.body = json({{"pin", reception_.guests().pin(role)}, {"name", "Ann"}}).dump();
-    reception_.handle_request(request, [&](const HttpAnswer& paired) {
+    reception_.handle_request(request, [&](const HttpResponse& paired) {
       request.authorization = "Bearer " + json::parse(paired.body)["token"].get<std::string>();
     });
     request.target = "/api/live";
@@ -57,7 +57,7 @@ class AReception : public testing::Test {
   void draw(std::uint8_t image, std::chrono::milliseconds after) {
     std::this_thread::sleep_for(after);
     ASSERT_FALSE(asked_.empty());
-    const ImageProviders::Answer answer = std::move(asked_.front());
+    const ImageCallback answer = std::move(asked_.front());
     asked_.pop_front();
     answer({R"({"why":""})", {image}});
   }
@@ -66,12 +66,12 @@ class AReception : public testing::Test {
   // sent.
   static std::optional<char> shown_to(const std::shared_ptr<WsClient>& client) {
     std::optional<char> out;
-    while (const auto sent = client->outbox.next())
+    while (const auto sent = client->outbox.next_message())
       if (!sent->is_text) out = sent->bytes->back();
     return out;
   }
 
-  std::deque<ImageProviders::Answer> asked_;
+  std::deque<ImageCallback> asked_;
   Reception reception_;
 };
 

@@ -51,7 +51,7 @@ class AServedSession : public AServer {
     ASSERT_TRUE(session) << session.message();
     session_.emplace(std::move(*session));
     health_.add({.name = "camera0", .kind = "camera"});
-    open({}, eyes_that_echo());
+    open({}, echoing_providers());
   }
   void TearDown() override { server_.reset(); }
 
@@ -63,8 +63,8 @@ class AServedSession : public AServer {
 
   void turn() {
     at_ = shifted(at_, 0.01);
-    server_->hear(&*session_, at_);
-    server_->tell(*session_, *telemetry_, health_, at_);
+    server_->apply_edits(&*session_, at_);
+    server_->publish_state(*session_, *telemetry_, health_, at_);
   }
   // Plays the session while guests do something on another thread.
   void play_while(const std::function<void()>& guests) {
@@ -201,7 +201,7 @@ TEST_F(AServedSession, AFloodOfEditsIsTakenInPortions) {
   turn();
   const double first_mm = 1e3 * session_->show_state().slots[0].nudge.x();
   EXPECT_GT(first_mm, 0);
-  EXPECT_LE(first_mm, Server::k_most_at_once + 1e-6);
+  EXPECT_LE(first_mm, Server::k_max_edits_at_once + 1e-6);
   for (int i = 0; i < 100; ++i) turn();
   EXPECT_NEAR(1e3 * session_->show_state().slots[0].nudge.x(), 100, 1e-6);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(ann->message_of("done")) << i;
@@ -319,8 +319,8 @@ TEST_F(AServedSession, GivesImagesAndAssemblies) {
 // A code in a projector's light is for those who stand there.
 TEST_F(AServedSession, ProjectsACodeForAWhile) {
   ServeOptions options;
-  options.code_lasts = 1500ms;
-  open(options, eyes_that_echo());
+  options.code_duration = 1500ms;
+  open(options, echoing_providers());
   session_->paint(at_, at_);
   const cv::Mat painted = session_->painted().projectors[0].clone();
   const auto is_painted = [&](const cv::Mat& lit) { return cv::norm(lit, painted, cv::NORM_INF) == 0; };
@@ -371,7 +371,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
     }
   });
   EXPECT_LT(seconds_since(begun), 1.4) << "too slow a machine for this test";
-  std::this_thread::sleep_until(begun + options.code_lasts);
+  std::this_thread::sleep_until(begun + options.code_duration);
   EXPECT_TRUE(is_painted(lit_by(0)));
   EXPECT_EQ(server_->code_projector(), "");
 }
@@ -540,8 +540,8 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
       at_ = rig.now();
       EXPECT_TRUE(session_->edit({"nudge", "mirror", count % 2 ? "0.2 0 0" : "-0.2 0 0"}, "test", at_));
       double guests_ms = -thread_ms();
-      server_->hear(&*session_, at_);
-      server_->tell(*session_, *telemetry_, health_, at_);
+      server_->apply_edits(&*session_, at_);
+      server_->publish_state(*session_, *telemetry_, health_, at_);
       guests_ms += thread_ms();
       const apps::ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);

@@ -67,23 +67,23 @@ class Room {
     const apps::ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig_->projector(static_cast<int>(k)).show(painted.projectors[k]).value();
-    tablet_view_->know(*session_);
+    tablet_view_->update_session(*session_);
   }
 
   struct Window {
     json said;
     cv::Mat image;
     std::vector<std::uint8_t> jpeg;
-    std::optional<Eigen::Vector3d> p_eye_world;
+    std::optional<Eigen::Vector3d> p_viewpoint_world;
   };
   Window look(const std::string& device,
               std::vector<std::uint8_t> jpeg,
               TabletViewMode parts = TabletViewMode::as_screen) {
-    std::promise<TabletView::Seen> answered;
-    tablet_view_->look({device, "", parts}, std::move(jpeg),
-                       [&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
-    TabletView::Seen seen = answered.get_future().get();
-    Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_eye_world};
+    std::promise<CompositeImage> answered;
+    tablet_view_->draw_window({device, "", parts}, std::move(jpeg),
+                              [&](CompositeImage seen) { answered.set_value(std::move(seen)); });
+    CompositeImage seen = answered.get_future().get();
+    Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_viewpoint_world};
     if (!seen.jpeg.empty()) window.image = device::decode_jpeg(seen.jpeg).value();
     return window;
   }
@@ -256,15 +256,15 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   const Eigen::Vector3d p_middle = world.world_from_prototype.translation;
   const Pose aside = looking_at(p_middle + Eigen::Vector3d(-0.5, -0.55, 0.1), p_middle, {0, 0, 1});
   const Room::Window seen = room.look(k_tablet, tablet.shoot_from(aside).jpeg);
-  ASSERT_TRUE(seen.p_eye_world.has_value()) << seen.said.dump();
+  ASSERT_TRUE(seen.p_viewpoint_world.has_value()) << seen.said.dump();
   const Eigen::Vector3d p_tablet = aside.inverse().translation,
                         p_own =
                             session.setup().scene.viewers[0].fixed->imager_from_world.inverse().translation;
-  EXPECT_LT((*seen.p_eye_world - p_tablet).norm(), 0.01);
+  EXPECT_LT((*seen.p_viewpoint_world - p_tablet).norm(), 0.01);
 
   // Nobody has asked for it.
   for (int i = 0; i < 3; ++i) {
-    session.see("Ann", seen.p_eye_world, room.rig().now());
+    session.see("Ann", seen.p_viewpoint_world, room.rig().now());
     room.step();
   }
   EXPECT_FALSE(session.painted().p_guest_eye_world.has_value());
@@ -278,7 +278,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   double farthest_m = 0;
   const auto steps = [&](int count, bool is_seen) {
     for (int i = 0; i < count; ++i) {
-      if (is_seen) session.see("Ann", seen.p_eye_world, room.rig().now());
+      if (is_seen) session.see("Ann", seen.p_viewpoint_world, room.rig().now());
       session.see("Ben", p_middle + Eigen::Vector3d(1, -1, 0), room.rig().now());
       room.step();
       const Eigen::Vector3d p_now = session.painted().p_guest_eye_world.value_or(p_own);
@@ -288,12 +288,12 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   };
   steps(11, true);
   EXPECT_EQ(session.painted().follows, "Ann");
-  EXPECT_LT((p_before - *seen.p_eye_world).norm(), 1e-6);
+  EXPECT_LT((p_before - *seen.p_viewpoint_world).norm(), 1e-6);
   const LitMirror followed =
       lit_mirror(world, session.painted().projectors, aside, folder / "lit-for-the-tablet");
   std::printf("light of the mirror: %.1f mm off, overlap %.2f; followed %.1f mm, %.2f; eye %.1f mm off; %s\n",
               before.off_mm, before.overlap, followed.off_mm, followed.overlap,
-              1e3 * (*seen.p_eye_world - p_tablet).norm(), folder.c_str());
+              1e3 * (*seen.p_viewpoint_world - p_tablet).norm(), folder.c_str());
   EXPECT_GT(before.off_mm, 15);
   EXPECT_LT(before.overlap, 0.6);
   EXPECT_LT(followed.off_mm, 2);
@@ -326,7 +326,7 @@ TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const auto edit = [&](const char* action, const char* slot, const char* value) {
     const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
     EXPECT_TRUE(done.ok()) << done.message();
-    room.tablet_view().know(session);
+    room.tablet_view().update_session(session);
   };
   test::VirtualTablet tablet = room.tablet(7);
   for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
@@ -373,9 +373,9 @@ TEST(Tablet, AMendedRigIsDrawnWith) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses", 0.25);
   const auto image = [&](TabletView* tablet_view) {
-    tablet_view->know(room.session());
-    std::promise<TabletView::Seen> answered;
-    tablet_view->room([&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+    tablet_view->update_session(room.session());
+    std::promise<CompositeImage> answered;
+    tablet_view->draw_room([&](CompositeImage seen) { answered.set_value(std::move(seen)); });
     return device::decode_jpeg(answered.get_future().get().jpeg).value();
   };
   const cv::Mat before = image(&room.tablet_view());
@@ -418,9 +418,9 @@ TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   // A wall: no markers. The room's image stands in.
   const Pose aside = looking_at({0, -1, 0.5}, {0, -3, 0.5}, Eigen::Vector3d::UnitZ());
   EXPECT_NE(said(k_tablet, tablet.shoot_from(aside).jpeg).find("No markers"), std::string::npos);
-  std::promise<TabletView::Seen> answered;
-  room.tablet_view().room([&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
-  const TabletView::Seen seen = answered.get_future().get();
+  std::promise<CompositeImage> answered;
+  room.tablet_view().draw_room([&](CompositeImage seen) { answered.set_value(std::move(seen)); });
+  const CompositeImage seen = answered.get_future().get();
   EXPECT_EQ(json::parse(seen.json)["why"], "");
   const auto image = device::decode_jpeg(seen.jpeg);
   ASSERT_TRUE(image);
@@ -448,12 +448,13 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   } answers;
   for (int i = 0; i < 2 * k_images; ++i) {
     const bool is_one = i % 2 == 0;
-    room.tablet_view().look({is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
-                            [&answers, i](TabletView::Seen seen) {
-                              const std::lock_guard lock(answers.mutex);
-                              answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
-                              ++answers.count;
-                            });
+    room.tablet_view().draw_window(
+        {is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
+        [&answers, i](CompositeImage seen) {
+          const std::lock_guard lock(answers.mutex);
+          answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
+          ++answers.count;
+        });
   }
   for (int i = 0; i < 600; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -474,10 +475,10 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   }
   EXPECT_LT(drawn, 2 * k_images);
   // What still waits at the end is told so.
-  std::promise<TabletView::Seen> late;
-  room.tablet_view().look({k_tablet}, one.jpeg, [](const TabletView::Seen&) {});
-  room.tablet_view().look({"tablet-late"}, one.jpeg,
-                          [&](TabletView::Seen seen) { late.set_value(std::move(seen)); });
+  std::promise<CompositeImage> late;
+  room.tablet_view().draw_window({k_tablet}, one.jpeg, [](const CompositeImage&) {});
+  room.tablet_view().draw_window({"tablet-late"}, one.jpeg,
+                                 [&](CompositeImage seen) { late.set_value(std::move(seen)); });
   room.end_onlooker();
   EXPECT_EQ(late.get_future().wait_for(std::chrono::seconds(0)), std::future_status::ready);
   // What was found of the lenses is kept.
@@ -508,16 +509,16 @@ TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnImage) {
   for (const Imager& p : world.rig.projectors)
     white.emplace_back(p.height, p.width, CV_8UC3, cv::Scalar::all(150));
   test::VirtualTablet tablet(world, white, k_width, k_height, 4);
-  TabletLocalizer eye(tracker::Families::load(tracker::families_of(bodies), scene.folder).value());
+  TabletLocalizer localizer(tracker::Families::load(tracker::families_of(bodies), scene.folder).value());
   int found = 0;
   for (int i = 0; i < 12; ++i) {
     const test::TabletShot shot = tablet.shoot(0.4 * i);
-    const TabletPose sight = eye.look(shot.image, bodies, tracks);
-    eye.learn();
-    ASSERT_TRUE(sight.view.has_value()) << sight.why;
+    const TabletPose pose = localizer.localize(shot.image, bodies, tracks);
+    localizer.update_intrinsics();
+    ASSERT_TRUE(pose.view.has_value()) << pose.why;
     if (i < 4) continue;  // the lens is new
-    EXPECT_TRUE(test::pose_near(sight.view->imager_from_world, shot.camera.imager_from_world, 0.005, 0.004));
-    for (const Track& track : sight.moved) {
+    EXPECT_TRUE(test::pose_near(pose.view->imager_from_world, shot.camera.imager_from_world, 0.005, 0.004));
+    for (const Track& track : pose.moved) {
       EXPECT_EQ(track.body, "mirror");
       EXPECT_LT((track.world_from_body.translation - tracks[1].world_from_body.translation - way).norm(),
                 0.01);
