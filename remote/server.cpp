@@ -11,16 +11,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::milliseconds k_publish_interval{50}, k_unwatched_publish_interval{1000},
-    k_edit_time_budget{5};
+constexpr std::chrono::milliseconds k_publish_interval{50}, k_unwatched_publish_interval{1000};
+constexpr std::chrono::milliseconds k_edit_time_budget{5};  // for edits, in one frame
+constexpr std::chrono::seconds k_camera_delay{2};           // images of cameras may show a code for so long
 
-constexpr std::chrono::seconds k_camera_delay{2};  // after which no image shows a code any more
-
-bool is_expired(const Wish& wish, std::chrono::steady_clock::time_point now) {
-  return now - wish.since >= k_longest_wish;
+bool is_expired(const EditRequest& request, std::chrono::steady_clock::time_point now) {
+  return now - request.requested_at >= k_edit_timeout;
 }
 
-// What the certificate is for: however people may call this machine.
+// All names and addresses by which people may reach this machine.
 std::vector<std::string> certificate_hosts(const std::string& host) {
   std::vector<std::string> names = {"localhost", "127.0.0.1", "::1"};
   if (!is_unspecified(host)) names.push_back(host);
@@ -34,7 +33,7 @@ std::vector<std::string> certificate_hosts(const std::string& host) {
   return names;
 }
 
-// Under which address other machines reach it.
+// The host part of a URL by which other machines reach this one.
 std::string shown_host(const std::string& host) {
   std::string shown = host;
   if (is_unspecified(host)) {
@@ -56,6 +55,31 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
 
 }  // namespace
 
+RequestHandler::Setup Server::handler_setup(const std::string& host,
+                                            const std::optional<Certificate>& certificate) {
+  return {.authentication = {.is_encrypted = certificate.has_value(),
+                             .is_loopback = is_loopback(host),
+                             .cookie = fmt::format("limn-{}", network_->port())},
+          .authority = certificate ? certificate->authority : "",
+          .files = {},
+          .providers = {},
+          .worker = &worker_,
+          .submit_edit =
+              [this](EditRequest request) {
+                const std::lock_guard lock(mutex_);
+                std::erase_if(edit_requests_,
+                              [&](const EditRequest& old) { return is_expired(old, request.requested_at); });
+                edit_requests_.push_back(std::move(request));
+              },
+          .set_viewpoint =
+              [this](const std::string& guest, const std::optional<Eigen::Vector3d>& p_viewpoint_world) {
+                const std::lock_guard lock(mutex_);
+                viewpoints_[guest] = p_viewpoint_world;
+              },
+          .set_has_guests = [this](bool has_guests) { has_guests_ = has_guests; },
+          .post = [network = network_.get()](std::function<void()> job) { network->post(std::move(job)); }};
+}
+
 Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageProviders providers) {
   const auto named = [](const Error& problem) {
     return Error{fmt::format("--serve: {}", problem.message), problem.wrong_usage};
@@ -73,46 +97,29 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   out->network_ = std::move(*network);
   out->update_providers_ = providers.update_session;
   out->code_.set_duration(options.code_duration);
-  Server* server = out.get();
-  out->reception_ = std::make_unique<Reception>(Reception::Setup{
-      .is_encrypted = certificate->has_value(),
-      .is_loopback = is_loopback(place->host),
-      .authority = certificate->has_value() ? (*certificate)->authority : "",
-      .cookie = fmt::format("limn-{}", out->network_->port()),
-      .files = std::move(*files),
-      .providers = std::move(providers),
-      .worker = &out->worker_,
-      .wish =
-          [server](Wish wish) {
-            const std::lock_guard lock(server->mutex_);
-            std::erase_if(server->edit_requests_,
-                          [&](const Wish& old) { return is_expired(old, wish.since); });
-            server->edit_requests_.push_back(std::move(wish));
-          },
-      .place =
-          [server](const std::string& guest, const std::optional<Eigen::Vector3d>& p_viewpoint_world) {
-            const std::lock_guard lock(server->mutex_);
-            server->viewpoints_[guest] = p_viewpoint_world;
-          },
-      .watched = [server](bool has_guests) { server->has_guests_ = has_guests; },
-      .post = [network = out->network_.get()](std::function<void()> job) { network->post(std::move(job)); }});
-  const bool is_encrypted = certificate->has_value();
-  out->invitation_ = {fmt::format("{}://{}:{}/", is_encrypted ? "https" : "http", shown_host(place->host),
-                                  out->network_->port()),
-                      is_encrypted ? (*certificate)->fingerprint : "",
-                      is_encrypted ? (*certificate)->authority_fingerprint : "",
-                      out->reception_->guests().pins()};
-  const apps::Invitation& invitation = out->invitation_;
-  log_info("live: the remote is at {}", invitation.url);
-  if (is_encrypted) {
-    log_info("live: its certificate's SHA-256 is {}", invitation.fingerprint);
-    log_info("live: that of limn.crt, for devices that shall trust it, is {}",
-             invitation.authority_fingerprint);
-  }
-  log_info("live: PINs of the remote: look {}, work {}, operate {}", invitation.pins[0], invitation.pins[1],
-           invitation.pins[2]);
-  out->network_->start(out->reception_.get());
+  RequestHandler::Setup setup = out->handler_setup(place->host, *certificate);
+  setup.files = std::move(*files);
+  setup.providers = std::move(providers);
+  out->handler_ = std::make_unique<RequestHandler>(std::move(setup));
+  out->invite_guests(place->host, *certificate);
+  out->network_->start(out->handler_.get());
   return out;
+}
+
+// Makes the invitation and logs it.
+void Server::invite_guests(const std::string& host, const std::optional<Certificate>& certificate) {
+  invitation_ = {
+      fmt::format("{}://{}:{}/", certificate ? "https" : "http", shown_host(host), network_->port()),
+      certificate ? certificate->fingerprint : "", certificate ? certificate->authority_fingerprint : "",
+      handler_->sessions().pins()};
+  log_info("live: the remote is at {}", invitation_.url);
+  if (certificate) {
+    log_info("live: its certificate's SHA-256 is {}", invitation_.fingerprint);
+    log_info("live: that of limn.crt, for devices that shall trust it, is {}",
+             invitation_.authority_fingerprint);
+  }
+  const auto& pins = invitation_.pins;
+  log_info("live: PINs of the remote: look {}, work {}, operate {}", pins[0], pins[1], pins[2]);
 }
 
 Server::~Server() { stop(); }
@@ -121,16 +128,16 @@ void Server::stop() {
   if (!network_) return;
   network_->stop();
   update_providers_ = {};
-  if (reception_) reception_->blind();
+  if (handler_) handler_->release_image_providers();
   worker_.close();
 }
 
-std::optional<Wish> Server::next_edit_request() {
+std::optional<EditRequest> Server::next_edit_request() {
   const std::lock_guard lock(mutex_);
   if (edit_requests_.empty()) return std::nullopt;
-  Wish wish = std::move(edit_requests_.front());
+  EditRequest request = std::move(edit_requests_.front());
   edit_requests_.pop_front();
-  return wish;
+  return request;
 }
 
 void Server::apply_edits(apps::Session* session, Stamp at) {
@@ -142,11 +149,11 @@ void Server::apply_edits(apps::Session* session, Stamp at) {
   }
   for (const auto& [guest, p_viewpoint_world] : viewpoints) session->see(guest, p_viewpoint_world, at);
   for (std::size_t i = 0; i < k_max_edits_at_once && Clock::now() - begun < k_edit_time_budget; ++i) {
-    const auto wish = next_edit_request();
-    if (!wish) break;
-    if (is_expired(*wish, Clock::now())) continue;
-    const Status done = session->edit(wish->edit, wish->who, at);
-    edit_results_.push_back({wish->number, done ? "" : done.message()});
+    const auto request = next_edit_request();
+    if (!request) break;
+    if (is_expired(*request, Clock::now())) continue;
+    const Status done = session->edit(request->edit, request->who, at);
+    edit_results_.push_back({request->number, done ? "" : done.message()});
   }
 }
 
@@ -161,7 +168,7 @@ void Server::show_code(const std::string& projector, Role role) {
   const std::string& pin = invitation_.pins[static_cast<std::size_t>(role)];
   code_.show(projector, {invitation_.url_for(role), pin, name_of(role)},
              [this, role](std::chrono::steady_clock::time_point until) {
-               network_->post([this, role, until] { reception_->hide_room(role, until + k_camera_delay); });
+               network_->post([this, role, until] { handler_->hide_room(role, until + k_camera_delay); });
              });
   log_info("live: {} shows the code of the remote for {}", projector, name_of(role));
 }
@@ -172,7 +179,8 @@ void Server::publish_state(const apps::Session& session,
                            Stamp at) {
   if (!begun_at_) begun_at_ = at;
   if (update_providers_) update_providers_(session);
-  if (session.is_writing()) return;  // what people ask for as soon as the state shows it must be on the disk
+  // Files that the state mentions must be complete on the disk, since guests may request them at once.
+  if (session.is_writing()) return;
   const auto now = Clock::now();
   const std::size_t edits = session.last_edit() ? session.last_edit()->count : 0;
   const bool is_due =
@@ -185,12 +193,18 @@ void Server::publish_state(const apps::Session& session,
     scene_ = std::make_shared<const scene::Scene>(session.setup().scene);
     scenes_ = session.scenes();
   }
-  SessionNews news{session_state(session, telemetry, health, *begun_at_), session.painted().projectors,
-                   session.show_state().looks, scene_, std::exchange(edit_results_, {})};
+  hand_over_news({session_state(session, telemetry, health, *begun_at_), session.painted().projectors,
+                  session.show_state().looks, scene_, std::exchange(edit_results_, {})});
+}
+
+// Hands news to the network's thread. News that it has not taken yet are replaced; their edit results are
+// kept.
+void Server::hand_over_news(SessionNews news) {
   {
     const std::lock_guard lock(mutex_);
-    if (news_)  // not taken yet
-      news.outcomes.insert(news.outcomes.begin(), news_->outcomes.begin(), news_->outcomes.end());
+    if (news_)
+      news.edit_results.insert(news.edit_results.begin(), news_->edit_results.begin(),
+                               news_->edit_results.end());
     news_ = std::move(news);
     if (std::exchange(is_news_posted_, true)) return;
   }
@@ -201,7 +215,7 @@ void Server::publish_state(const apps::Session& session,
       newest = std::exchange(news_, std::nullopt);
       is_news_posted_ = false;
     }
-    if (newest) reception_->take(std::move(*newest));
+    if (newest) handler_->update_news(std::move(*newest));
   });
 }
 

@@ -14,6 +14,9 @@
 
 namespace limn::remote {
 
+/// Runs a job on the network's thread. It may be called from any thread.
+using NetworkPost = std::function<void(std::function<void()>)>;
+
 /// One message to write to a WebSocket.
 struct Outgoing {
   std::shared_ptr<const std::string> bytes;
@@ -47,8 +50,8 @@ class HttpHandler {
  public:
   virtual ~HttpHandler() = default;
 
-  /// Calls `answering` exactly once, perhaps later and on another thread.
-  virtual void handle_request(const HttpRequest& request, ResponseCallback answering) = 0;
+  /// Calls `respond` exactly once, perhaps later and on another thread.
+  virtual void handle_request(const HttpRequest& request, ResponseCallback respond) = 0;
   /// Handles a request for an upgrade to a WebSocket: the peer of the new connection, or a error_response.
   virtual std::variant<std::shared_ptr<WebSocketPeer>, HttpResponse> accept_web_socket(
       const HttpRequest& request) = 0;

@@ -104,13 +104,13 @@ struct SharedState {
   std::map<std::uint64_t, ResponseCallback> waiting;
   std::uint64_t last_waiting = 0;
 
-  // The same function for any thread: it runs `answering` on the network's thread.
-  ResponseCallback answering_on_this_thread(ResponseCallback answering) {
-    waiting.emplace(++last_waiting, std::move(answering));
-    return [this, number = last_waiting](HttpResponse answer) {
-      asio::post(io, [this, number, answer = std::move(answer)]() mutable {
+  // The same function for any thread: it runs `respond` on the network's thread.
+  ResponseCallback on_network_thread(ResponseCallback respond) {
+    waiting.emplace(++last_waiting, std::move(respond));
+    return [this, number = last_waiting](HttpResponse response) {
+      asio::post(io, [this, number, response = std::move(response)]() mutable {
         const auto found = waiting.extract(number);
-        if (!found.empty()) found.mapped()(std::move(answer));
+        if (!found.empty()) found.mapped()(std::move(response));
       });
     };
   }
@@ -269,7 +269,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
  private:
   void begin() {
     if (slot_->kind() == ConnectionSlots::Kind::rejected)
-      return write_last(error_response(503, "too many connections. Try again in a moment."));
+      return write_last(error_response(k_http_unavailable, "too many connections. Try again in a moment."));
     read();
   }
 
@@ -297,16 +297,19 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
   void reject(Problem problem) {
     const bool has_begun = parser_->got_some();
     if (is_late_)
-      return has_begun ? write_last(error_response(408, "expected a whole request sooner.")) : close();
+      return has_begun ? write_last(error_response(k_http_timeout, "expected a whole request sooner."))
+                       : close();
     if (problem == http::error::body_limit)
-      return write_last(error_response(
-          413, fmt::format("expected a body of at most {} bytes.", shared_->limits.body_bytes)));
+      return write_last(
+          error_response(k_http_content_too_large,
+                         fmt::format("expected a body of at most {} bytes.", shared_->limits.body_bytes)));
     if (problem == http::error::header_limit || problem == http::error::buffer_overflow)
-      return write_last(error_response(
-          431, fmt::format("expected headers of at most {} bytes.", shared_->limits.header_bytes)));
+      return write_last(
+          error_response(k_http_headers_too_large,
+                         fmt::format("expected headers of at most {} bytes.", shared_->limits.header_bytes)));
     if (problem.category() == http::make_error_code(http::error::bad_method).category() &&
         problem != http::error::end_of_stream && problem != http::error::partial_message)
-      return write_last(error_response(400, "expected a request of HTTP 1.1."));
+      return write_last(error_response(k_http_bad_request, "expected a request of HTTP 1.1."));
     close();
   }
 
@@ -342,25 +345,25 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
       return socket->run(parser_->get());
     }
     shared_->handler->handle_request(
-        asked, shared_->answering_on_this_thread([self = this->shared_from_this()](HttpResponse answer) {
-          self->write(std::move(answer), self->keeps_alive_);
+        asked, shared_->on_network_thread([self = this->shared_from_this()](HttpResponse response) {
+          self->write(std::move(response), self->keeps_alive_);
         }));
   }
 
-  void write_last(HttpResponse answer) { write(std::move(answer), false); }
+  void write_last(HttpResponse response) { write(std::move(response), false); }
 
-  void write(HttpResponse answer, bool keeps_alive) {
+  void write(HttpResponse response, bool keeps_alive) {
     response_.emplace();
     response_->version(11);
-    response_->result(static_cast<unsigned>(answer.status));
+    response_->result(static_cast<unsigned>(response.status));
     response_->keep_alive(keeps_alive);
     for (const auto& [name, value] : security_headers()) response_->set(name, value);
-    if (!answer.type.empty()) response_->set(http::field::content_type, answer.type);
-    if (answer.status >= 400) response_->set(http::field::cache_control, "no-store");
-    for (const auto& [name, value] : answer.headers) response_->set(name, value);
-    const bool has_length = answer.status != 304;
-    if (has_length) response_->content_length(answer.body.size());
-    if (!is_head_) response_->body() = std::move(answer.body);
+    if (!response.type.empty()) response_->set(http::field::content_type, response.type);
+    if (response.status >= 400) response_->set(http::field::cache_control, "no-store");
+    for (const auto& [name, value] : response.headers) response_->set(name, value);
+    const bool has_length = response.status != 304;
+    if (has_length) response_->content_length(response.body.size());
+    if (!is_head_) response_->body() = std::move(response.body);
     beast::get_lowest_layer(stream_).expires_after(shared_->limits.write);
     http::async_write(stream_, *response_,
                       [self = this->shared_from_this(), keeps_alive](Problem problem, std::size_t) {

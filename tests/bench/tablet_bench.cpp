@@ -131,7 +131,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, remote::Tabl
                                                      room->setup.scene.folder)
                                  .value(),
                              {.encoding = tracker::Encoding::srgb});
-  // All with the onlooker's priority, so that a busy machine disturbs both alike.
+  // All with the tablet view's priority, so that a busy machine disturbs both alike.
   setpriority(PRIO_PROCESS, static_cast<id_t>(syscall(SYS_gettid)), 19);
   std::vector<double> alone[3], parts[4], server, answer, yardstick_processor, processor;
   Off off;

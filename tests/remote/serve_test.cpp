@@ -264,7 +264,7 @@ TEST_F(AServer, AnswersEveryFrameOfAWindowWithItsNumber) {
 TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
   open({}, echoing_providers());
   std::vector<std::unique_ptr<RemoteClient>> tablets;
-  for (std::ptrdiff_t i = 0; i <= k_most_windows; ++i) {
+  for (std::ptrdiff_t i = 0; i <= k_max_windows; ++i) {
     tablets.push_back(guest(Role::look));
     tablets.back()->send_text(
         fmt::format(R"({{"type": "window", "device": "tablet-{:04}", "on": true}})", i));

@@ -93,7 +93,7 @@ class Room {
   }
 
   TabletView& tablet_view() { return *tablet_view_; }
-  void end_onlooker() { tablet_view_.reset(); }
+  void destroy_tablet_view() { tablet_view_.reset(); }
   apps::Session& session() { return *session_; }
   sim::VirtualRig& rig() { return *rig_; }
 
@@ -479,7 +479,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   room.tablet_view().draw_window({k_tablet}, one.jpeg, [](const CompositeImage&) {});
   room.tablet_view().draw_window({"tablet-late"}, one.jpeg,
                                  [&](CompositeImage seen) { late.set_value(std::move(seen)); });
-  room.end_onlooker();
+  room.destroy_tablet_view();
   EXPECT_EQ(late.get_future().wait_for(std::chrono::seconds(0)), std::future_status::ready);
   // What was found of the lenses is kept.
   EXPECT_EQ(load_lenses(lenses, "tablet-one").size(), 1u);
