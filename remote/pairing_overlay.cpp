@@ -12,12 +12,12 @@ namespace limn::remote {
 namespace {
 
 constexpr auto k_font = cv::FONT_HERSHEY_SIMPLEX;
-constexpr double k_capital_px = 22;        // of the font at scale 1
-constexpr double k_fill = 0.8;             // of the width, by text
-constexpr int k_candidates_per_side = 40;  // places looked at along the image's shorter side
-constexpr int k_nodes = 8;                 // looked at along each side of a place
-constexpr double k_flat = 0.03;            // of a sign's width, from a plane
-constexpr double k_smaller = 0.93;         // from one size to the next
+constexpr double k_capital_px = 22;        // height of the font's capitals at scale 1
+constexpr double k_fill = 0.8;             // share of the width that text fills
+constexpr int k_candidates_per_side = 40;  // along the image's shorter side
+constexpr int k_nodes = 8;                 // points that are checked along each side of a place
+constexpr double k_flat = 0.03;            // largest distance from a plane, as a share of the sign's width
+constexpr double k_smaller = 0.93;         // factor from one size that is tried to the next
 constexpr double k_least_upright = 0.2;    // sine of the angle between the surface's normal and up
 
 std::optional<Eigen::Vector3d> point_at(const cv::Mat& points, int x, int y) {
@@ -26,7 +26,7 @@ std::optional<Eigen::Vector3d> point_at(const cv::Mat& points, int x, int y) {
   return Eigen::Vector3d(p[0], p[1], p[2]);
 }
 
-// A line of text in the middle of a row; returns where the next row begins.
+// Draws a line of centred text. Returns the top of the next row.
 int draw_text(const std::string& text, double share, int top, cv::Mat* sign) {
   constexpr int k_measured = 1;
   const cv::Size unit = cv::getTextSize(text, k_font, 1, k_measured, nullptr);
@@ -72,8 +72,8 @@ std::optional<apps::OverlayPlace> overlay_place(const Imager& projector,
   const int step = std::max(1, std::min(points.cols, points.rows) / k_candidates_per_side);
   struct Candidate {
     Eigen::Vector3d p;
-    Eigen::Vector3d d_right, d_down;  // unit
-    double m_per_px;                  // along the direction in which it is foreshortened most
+    Eigen::Vector3d d_right, d_down;  // unit vectors
+    double m_per_px;                  // in the direction of the strongest foreshortening
   };
   std::vector<Candidate> candidates;
   for (int y = step; y < points.rows - step; y += step)
@@ -92,7 +92,7 @@ std::optional<apps::OverlayPlace> overlay_place(const Imager& projector,
     const Eigen::Vector3d d_right = width * candidate.d_right, d_down = aspect * width * candidate.d_down;
     return apps::OverlayPlace{candidate.p - 0.5 * (d_right + d_down), d_right, d_down};
   };
-  // Whether the surface is there everywhere and flat, to a share of the width.
+  // Whether the prototype covers the place and is flat there.
   const auto is_free = [&](const apps::OverlayPlace& place) {
     const double most = k_flat * place.d_right.norm();
     for (int i = 0; i <= k_nodes; ++i)

@@ -9,16 +9,16 @@
 namespace limn::remote {
 namespace {
 
-constexpr double k_code_share = 0.5;  // of a projector's shorter side, without a prototype
+constexpr double k_code_share = 0.5;  // the code's share of the image's shorter side, without a prototype
 constexpr std::chrono::milliseconds k_search_interval{300}, k_search_timeout{2000};
-constexpr int k_pin_px = 360;            // a PIN's sign, as it is kept
-constexpr double k_least_pin_px = 50;    // in the projector's image
-constexpr int k_dark = 8;                // display value
-constexpr int k_code_module_px = 12;     // of the code, as it is kept
-constexpr double k_least_module_px = 2;  // of the projector's image, that a phone still reads
-constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
+constexpr int k_pin_px = 360;            // width of the PIN's sign before it is placed
+constexpr double k_least_pin_px = 50;    // smallest width of the PIN's sign in the projector's image
+constexpr int k_dark = 8;                // display value; brighter pixels belong to a part
+constexpr int k_code_module_px = 12;     // module of the code before it is placed
+constexpr double k_least_module_px = 2;  // smallest module in the projector's image that phones read
+constexpr double k_code_light = 0.75;    // display value; full white would outshine everything else
 
-// Where the prototype is free of markers and, if there is room, of parts.
+// A place on the prototype without markers and, if there is room, without parts.
 std::optional<apps::OverlayPlace> free_place(apps::Session* session,
                                              std::size_t projector,
                                              cv::Size shape,
@@ -60,7 +60,8 @@ void ProjectedCode::end() {
   place_.reset();
 }
 
-// It begins with a place for it; after a while without one, too: the prototype may not be seen.
+// Starts the code's time when there is a place for it. After k_search_timeout it starts without one, since
+// the prototype may not be tracked. Returns whether the code is shown.
 bool ProjectedCode::start_if_due(apps::Session* session, std::size_t projector) {
   if (shown_until_) return true;
   const auto now = Clock::now();

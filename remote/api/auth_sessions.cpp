@@ -16,7 +16,7 @@ void fill_with_random(unsigned char* bytes, std::size_t count) {
 }
 
 std::string random_pin() {
-  constexpr std::uint32_t k_limit = 0xffffffffu / k_pins * k_pins;  // below it all PINs are as likely
+  constexpr std::uint32_t k_limit = 0xffffffffu / k_pins * k_pins;  // below it all PINs are equally likely
   std::uint32_t number = k_limit;
   while (number >= k_limit) fill_with_random(reinterpret_cast<unsigned char*>(&number), sizeof number);
   return fmt::format("{:06}", number % k_pins);
@@ -51,7 +51,7 @@ std::string lower_case(std::string text) {
   return text;
 }
 
-// What counts as one network: an IPv4 address, an IPv6 network.
+// The network whose attempts are counted together: one IPv4 address, or an IPv6 network (/64).
 std::string network_of(const std::string& address) {
   in6_addr six{};
   if (inet_pton(AF_INET6, address.c_str(), &six) != 1) return address;

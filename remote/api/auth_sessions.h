@@ -13,33 +13,33 @@
 
 namespace limn::remote {
 
-/// How many bytes of a token are random.
+/// Random bytes of a token.
 constexpr std::size_t k_token_bytes = 32;
-/// How long a guest's session lasts, and how many there are at once: the oldest goes for one more.
+/// How long a guest's session lasts, and how many there are at once. One more ends the oldest.
 constexpr std::chrono::hours k_session_life{12};
 constexpr std::size_t k_max_sessions = 256;
-/// Wrong PINs after which nobody is paired for a while: from one address, and from all.
+/// Wrong PINs after which pairing is locked: from one address for that address, from all for everybody.
 constexpr int k_max_wrong_pins = 10, k_max_wrong_pins_of_all = 100;
-/// That while: every time twice as long, up to the second.
+/// The time of the first lock. It doubles with every lock, up to the second value.
 constexpr std::chrono::minutes k_first_wait{1}, k_longest_wait{16};
-/// An address that tried nothing wrong for so long begins anew; so many are remembered.
+/// An address without a wrong PIN for this long is forgotten, and so are the oldest of too many addresses.
 constexpr std::chrono::minutes k_attempts_kept_for{60};
 constexpr std::size_t k_max_addresses = 1024;
 
-/// Who may come in: three PINs, one a role, drawn anew for every Guests; sessions of those who were paired.
-/// Belongs to one thread; moments are the caller's, so that hours can pass in a test.
+/// Pairs guests by PIN and keeps their sessions. Each role has a PIN, drawn at random for every object.
+/// Belongs to one thread. The caller passes the time, so that hours can pass in a test.
 class AuthSessions {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
   struct Guest {
-    std::uint64_t number = 0;  ///< of this session; never used again
+    std::uint64_t number = 0;  ///< The session's number, which is never used again.
     std::string name;
     Role role = Role::look;
     Time until;
   };
   struct Paired {
-    std::string token;  ///< 256 random bits, hexadecimal: what a session is known by
+    std::string token;  ///< 256 random bits in hexadecimal, which identify the session.
     Guest guest;
   };
   struct WrongPin {};
@@ -49,23 +49,26 @@ class AuthSessions {
 
   AuthSessions();
 
-  /// Of six digits, one a role; all different.
+  /// One PIN of six digits for each role; all differ.
   const std::array<std::string, 3>& pins() const { return pins_; }
   const std::string& pin(Role role) const { return pins_[static_cast<std::size_t>(role)]; }
 
-  /// A session for whoever knows a PIN. `address`: a numeric IP address; those of an IPv6 network (/64) count
-  /// as one. While it is to wait nothing is compared, so a right PIN says no more than a wrong one. Somebody
-  /// of the same name is told apart: "Ann (2)". `replaced`: who asks has that session already, which ends.
+  /// Begins a session for somebody who knows a PIN. `address` is a numeric IP address; all addresses of an
+  /// IPv6 network (/64) count as one. While pairing is locked (Wait) no PIN is compared, so that the answer
+  /// does not show whether it is right. A second guest of the same name is called "Ann (2)". `replaced` is
+  /// the session that the guest has already; it ends.
   std::variant<Paired, WrongPin, Wait> pair(const std::string& pin,
                                             const std::string& name,
                                             const std::string& address,
                                             Time now,
                                             const std::optional<Guest>& replaced = {});
 
-  /// Whose token it is; nullopt: nobody's, or the session is over.
+  /// The guest with this token; nullopt: there is none, or the session is over.
   std::optional<Guest> find(const std::string& token, Time now) const;
+  /// Whether the session of this number exists and is not over.
   bool is_valid(std::uint64_t guest, Time now) const;
   void end_session(std::uint64_t guest);
+  /// How many sessions there are.
   std::size_t count() const { return sessions_.size(); }
 
  private:

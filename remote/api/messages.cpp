@@ -9,10 +9,11 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t k_shortest_device = 8, k_longest_device = 64, k_pin_digits = 6;
-constexpr std::uint64_t k_max_id = (std::uint64_t{1} << 53) - 1;  // that a page's numbers hold
-constexpr std::size_t k_max_quoted = 40;                          // bytes of what was found, in errors
+constexpr std::uint64_t k_max_id =
+    (std::uint64_t{1} << 53) - 1;         // the largest that JavaScript's numbers hold
+constexpr std::size_t k_max_quoted = 40;  // bytes of quoted text, in errors
 
-// For errors: short, without control characters, never half a letter.
+// Text for errors: short, and in ASCII, so that no letter is cut in half.
 std::string in_quotes(const std::string& text) {
   std::string out;
   for (const char c : text.substr(0, k_max_quoted)) {
@@ -35,7 +36,7 @@ bool has_controls(const std::string& text, bool may_have_lines) {
   });
 }
 
-// An object's members, read one by one; the first problem stays.
+// Reads the members of a JSON object one by one and keeps the first problem.
 class Reader {
  public:
   static Result<Reader> of(std::string_view text) {
@@ -47,9 +48,9 @@ class Reader {
     return Reader(std::move(all));
   }
 
-  // Left out: empty, when it may be.
+  // An absent text is empty, if it may be absent.
   std::string text(const char* key, std::size_t longest, bool may_be_absent, bool may_have_lines = false) {
-    const json* value = taken(key, may_be_absent);
+    const json* value = member(key, may_be_absent);
     if (!value) return "";
     if (!value->is_string()) return problem(key, "text", found_in(*value)), "";
     const auto& found = value->get_ref<const std::string&>();
@@ -61,7 +62,7 @@ class Reader {
   }
 
   std::uint64_t number(const char* key, std::uint64_t most) {
-    const json* value = taken(key, false);
+    const json* value = member(key, false);
     if (!value) return 0;
     if (!value->is_number_unsigned() || value->get<std::uint64_t>() > most)
       return problem(key, fmt::format("a whole number from 0 to {}", most), found_in(*value)), 0;
@@ -69,7 +70,7 @@ class Reader {
   }
 
   bool boolean(const char* key) {
-    const json* value = taken(key, false);
+    const json* value = member(key, false);
     if (!value) return false;
     if (!value->is_boolean()) return problem(key, "true or false", found_in(*value)), false;
     return value->get<bool>();
@@ -79,19 +80,19 @@ class Reader {
     if (!problem_) problem_ = error("{}: expected {}, found {}.", key, expected, found);
   }
 
-  // After everything was read: all of it is known.
+  // Call it after all reads: there must be no other keys.
   Status status() const {
     if (problem_) return *problem_;
     for (const auto& [key, value] : all_.items())
-      if (std::find(taken_.begin(), taken_.end(), key) == taken_.end())
+      if (std::find(read_keys_.begin(), read_keys_.end(), key) == read_keys_.end())
         return error("expected no other keys, found {}.", in_quotes(key));
     return {};
   }
 
  private:
   explicit Reader(json all) : all_(std::move(all)) {}
-  const json* taken(const char* key, bool may_be_absent) {
-    taken_.push_back(key);
+  const json* member(const char* key, bool may_be_absent) {
+    read_keys_.push_back(key);
     const auto found = all_.find(key);
     if (found != all_.end()) return &*found;
     if (!may_be_absent) problem(key, "it", "no such key");
@@ -99,7 +100,7 @@ class Reader {
   }
 
   json all_;
-  std::vector<std::string> taken_;
+  std::vector<std::string> read_keys_;
   std::optional<Error> problem_;
 };
 

@@ -8,10 +8,10 @@ namespace limn::remote {
 
 using scene::Role;
 
-/// Who may do an action, by its name; `operate` for one that is not in scene::actions().
+/// The role that an action needs, by its name; `operate` for a name that is not in scene::actions().
 Role role_for(const std::string& action);
 
-/// The table of actions as GET /api/actions tells it: JSON.
+/// The table of actions as JSON, the answer to GET /api/actions.
 std::string actions_json();
 
 }  // namespace limn::remote

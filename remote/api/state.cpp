@@ -53,7 +53,7 @@ std::string light_text(const scene::Scene& scene, const scene::ShowState& show_s
                      (*numbers)[4]);
 }
 
-// A millimetre's thousandth, for people and for short messages.
+// Rounded to three decimals, for short messages.
 double rounded(double value) { return std::round(1e3 * value) / 1e3; }
 
 nlohmann::ordered_json to_json(const SessionState::Slot& slot) {

@@ -10,11 +10,11 @@
 
 namespace limn::remote {
 
-/// Each variant's image by itself, as PNG; drawn all at once when the first one of a scene is asked for, in
-/// a GL context that goes again. Belongs to one thread, which must have no context of its own.
+/// An image of each variant by itself, as PNG. All are drawn when the first one of a scene is requested, in a
+/// GL context that is destroyed afterwards. Belongs to one thread, which must have no current GL context.
 class Thumbnails {
  public:
-  /// Error: no GL context, a scene that cannot be drawn, no such variant.
+  /// The image of a variant. Errors: no GL context, a scene that cannot be drawn, no such variant.
   Result<std::shared_ptr<const std::string>> png(const std::shared_ptr<const scene::Scene>& scene,
                                                  const std::string& slot,
                                                  const std::string& variant);

@@ -29,8 +29,8 @@ namespace fs = std::filesystem;
 
 constexpr const char *k_file = "remote.pem", *k_authority_file = "authority.pem";
 constexpr long k_day_s = 24 * 60 * 60;
-// What an authority may speak for, besides the hosts that it is made for: networks that nobody reaches from
-// outside (RFC 1918, 3927, 4193, 4291), this machine, and names of mDNS.
+// What an authority may sign for besides its hosts: networks that cannot be reached from outside (RFC 1918,
+// 3927, 4193, 4291), this machine, and names of mDNS.
 constexpr const char* k_permitted =
     "critical,permitted;DNS:local,permitted;DNS:localhost,"
     "permitted;IP:127.0.0.0/255.0.0.0,permitted;IP:10.0.0.0/255.0.0.0,permitted;IP:172.16.0.0/255.240.0.0,"
@@ -124,7 +124,7 @@ Pair unsigned_pair(const std::string& name, int days) {
       BN_bin2bn(serial.data(), static_cast<int>(serial.size()), nullptr));
   LIMN_CHECK(number && BN_to_ASN1_INTEGER(number.get(), X509_get_serialNumber(certificate)));
   X509_set_version(certificate, X509_VERSION_3);
-  X509_gmtime_adj(X509_getm_notBefore(certificate), -k_day_s);  // clocks of phones differ
+  X509_gmtime_adj(X509_getm_notBefore(certificate), -k_day_s);  // for phones whose clocks are slow
   X509_gmtime_adj(X509_getm_notAfter(certificate), days * k_day_s);
   X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate), "CN", MBSTRING_UTF8,
                              reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);
@@ -138,7 +138,7 @@ void sign(const Pair& authority, X509* certificate) {
 }
 
 Pair make_authority(const std::vector<std::string>& hosts) {
-  constexpr std::size_t k_most = 40;  // letters of the machine's name; a certificate's has 64 at most
+  constexpr std::size_t k_most = 40;  // letters of the machine's name; a certificate's name has 64 at most
   const std::string machine = own_host_name().substr(0, k_most);
   Pair out = unsigned_pair(machine.empty() ? "Limn" : "Limn on " + machine, k_authority_days);
   X509* certificate = out.certificate.get();
@@ -171,7 +171,7 @@ bool is_signed_by(const Pair& authority, X509* certificate) {
 bool may_sign(const Pair& authority, X509* certificate) {
   const NameConstraints permitted(static_cast<NAME_CONSTRAINTS*>(
       X509_get_ext_d2i(authority.certificate.get(), NID_name_constraints, nullptr, nullptr)));
-  X509_check_purpose(certificate, -1, 0);  // reads the names that are checked
+  X509_check_purpose(certificate, -1, 0);  // parses the names, which the next check needs
   return permitted && NAME_CONSTRAINTS_check(certificate, permitted.get()) == X509_V_OK;
 }
 
@@ -200,7 +200,7 @@ Error write_error(const fs::path& path) {
                std::strerror(errno));
 }
 
-// As write_file(), but from the first moment for its owner alone.
+// As write_file(), but only the owner can ever read the file.
 Status write_secret(const fs::path& path, const std::string& content) {
   std::string temporary = path.string() + ".XXXXXX";
   const int handle = ::mkstemp(temporary.data());

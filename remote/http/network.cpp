@@ -333,11 +333,11 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
   }
 
   void handle_request() {
-    const HttpRequest asked = request();
-    is_head_ = asked.method == "HEAD";
+    const HttpRequest received = request();
+    is_head_ = received.method == "HEAD";
     keeps_alive_ = parser_->get().keep_alive();
-    if (asked.is_upgrade) {
-      auto accepted = shared_->handler->accept_web_socket(asked);
+    if (received.is_upgrade) {
+      auto accepted = shared_->handler->accept_web_socket(received);
       if (auto* refused = std::get_if<HttpResponse>(&accepted)) return write_last(std::move(*refused));
       const auto socket =
           std::make_shared<Socket<Stream>>(std::move(stream_), shared_, std::move(slot_),
@@ -345,7 +345,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
       return socket->run(parser_->get());
     }
     shared_->handler->handle_request(
-        asked, shared_->on_network_thread([self = this->shared_from_this()](HttpResponse response) {
+        received, shared_->on_network_thread([self = this->shared_from_this()](HttpResponse response) {
           self->write(std::move(response), self->keeps_alive_);
         }));
   }

@@ -5,14 +5,14 @@
 
 namespace limn::remote {
 
-/// Whether a numeric address is this machine's own, which nobody else can reach: 127.0.0.0/8 and ::1.
+/// Whether a numeric address is the loopback's, which no other machine can reach: 127.0.0.0/8 or ::1.
 bool is_loopback(const std::string& address);
-/// Whether it stands for all addresses of the machine: 0.0.0.0 and ::.
+/// Whether an address stands for all addresses of the machine: 0.0.0.0 or ::.
 bool is_unspecified(const std::string& address);
 
-/// Numeric addresses of this machine in networks, IPv4 first; without the loopback and link-local ones.
+/// This machine's numeric addresses, IPv4 first, without loopback and link-local addresses.
 std::vector<std::string> own_addresses();
-/// The machine's name; empty when it has none.
+/// This machine's host name; empty when it has none.
 std::string own_host_name();
 
 }  // namespace limn::remote

@@ -51,36 +51,37 @@ double misfit(const tracker::MarkerCorrespondences& marker, const Pose& pose) {
                                      : std::sqrt(squares / static_cast<double>(chosen.observations.size()));
 }
 
-double gate_of(const BodyCorrespondences& seen, const Pose& pose) {
+double gate_of(const BodyCorrespondences& corners, const Pose& pose) {
   std::vector<double> off;
-  for (const tracker::MarkerCorrespondences& marker : seen) off.push_back(misfit(marker, pose));
+  for (const tracker::MarkerCorrespondences& marker : corners) off.push_back(misfit(marker, pose));
   return std::max(k_gate_px, k_gate_of_median * median(std::move(off)));
 }
 
-BodyCorrespondences without_moved(const BodyCorrespondences& seen, const Pose& pose) {
-  const double gate = gate_of(seen, pose);
+BodyCorrespondences without_moved(const BodyCorrespondences& corners, const Pose& pose) {
+  const double gate = gate_of(corners, pose);
   BodyCorrespondences kept;
-  for (const tracker::MarkerCorrespondences& marker : seen)
+  for (const tracker::MarkerCorrespondences& marker : corners)
     if (misfit(marker, pose) <= gate) kept.push_back(marker);
   return kept;
 }
 
 // The pose fitted from the last one, if there are enough markers and it fits them all. This is faster than a
 // search from nothing.
-std::optional<PoseFit> fitted_near(const BodyCorrespondences& seen, const std::optional<Pose>& last) {
+std::optional<PoseFit> fitted_near(const BodyCorrespondences& corners, const std::optional<Pose>& last) {
   constexpr std::size_t k_enough = 4;
   constexpr double k_fits_px = 1;
-  if (!last || seen.size() < k_enough) return std::nullopt;
-  const auto fit = tracker::fit_pose(tracker::corners_at(seen, *last).observations, *last, tracker::k_huber);
+  if (!last || corners.size() < k_enough) return std::nullopt;
+  const auto fit =
+      tracker::fit_pose(tracker::corners_at(corners, *last).observations, *last, tracker::k_huber);
   return fit && fit->rms_px < k_fits_px ? fit : std::nullopt;
 }
 
 // The standard deviation of the projected centre of the markers, px.
-double position_stddev_px(const Imager& camera, const PoseFit& fit, const BodyCorrespondences& seen) {
+double position_stddev_px(const Imager& camera, const PoseFit& fit, const BodyCorrespondences& corners) {
   Eigen::Vector3d p_middle = Eigen::Vector3d::Zero();
-  for (const tracker::MarkerCorrespondences& marker : seen)
+  for (const tracker::MarkerCorrespondences& marker : corners)
     p_middle += marker.marker->body_from_marker.translation;
-  p_middle /= static_cast<double>(seen.size());
+  p_middle /= static_cast<double>(corners.size());
   const tracker::PointObservation observation{&camera.lens, Pose(), p_middle, Eigen::Vector2d::Zero()};
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 6> d_r;
@@ -116,12 +117,12 @@ std::vector<Track> moved_markers(const Imager& view,
   for (const Track& track : tracks) {
     const Body* body = find_named(bodies, track.body);
     if (!body || body->markers.size() != 1 || track.tracking == TrackingState::lost) continue;
-    const BodyCorrespondences seen = tracker::correspondences(*body, std::span(&here, 1));
+    const BodyCorrespondences corners = tracker::correspondences(*body, std::span(&here, 1));
     const Pose expected = view.imager_from_world * track.world_from_body;
-    if (seen.empty() || misfit(seen[0], expected) <= gate_px) continue;
+    if (corners.empty() || misfit(corners[0], expected) <= gate_px) continue;
     // Of two ambiguous poses the one whose rotation is nearer to the old track.
     std::optional<PoseFit> best;
-    for (const PoseFit& fit : tracker::minima(seen))
+    for (const PoseFit& fit : tracker::minima(corners))
       if (!best || angle_between(fit.world_from_body.rotation, expected.rotation) <
                        angle_between(best->world_from_body.rotation, expected.rotation))
         best = fit;
@@ -180,11 +181,11 @@ void TabletLocalizer::collect_views(const Imager& camera,
   for (const Body& body : bodies)
     for (const Track& track : tracks) {
       if (body.markers.size() < 2 || track.body != body.name) continue;
-      const BodyCorrespondences seen = tracker::correspondences(body, std::span(&view, 1));
-      if (seen.size() < 2) continue;
+      const BodyCorrespondences corners = tracker::correspondences(body, std::span(&view, 1));
+      if (corners.size() < 2) continue;
       calib::BodyView noted{camera.imager_from_world * track.world_from_body, {}};
       for (const tracker::PointObservation& observation :
-           tracker::corners_at(seen, noted.camera_from_body).observations)
+           tracker::corners_at(corners, noted.camera_from_body).observations)
         noted.points.push_back(
             {observation.p_body, (scale.array() * (observation.px.array() + 0.5) - 0.5).matrix(),
              scale.asDiagonal() * Eigen::Matrix2d(observation.information.inverse()) * scale.asDiagonal()});
@@ -220,36 +221,36 @@ TabletPose TabletLocalizer::localize(const cv::Mat& bgr,
   const tracker::View view{&camera, detections};
   // Bodies with several markers have better poses than those with one.
   Body room = known_markers(bodies, tracks, 2);
-  BodyCorrespondences seen = tracker::correspondences(room, std::span(&view, 1));
-  if (seen.size() < 2) {
+  BodyCorrespondences corners = tracker::correspondences(room, std::span(&view, 1));
+  if (corners.size() < 2) {
     room = known_markers(bodies, tracks, 1);
-    seen = tracker::correspondences(room, std::span(&view, 1));
+    corners = tracker::correspondences(room, std::span(&view, 1));
   }
-  if (seen.empty())
+  if (corners.empty())
     return without_pose("The markers in view have no known place: the room's camera must see them, too.");
   std::vector<PoseFit> fits;
-  if (const auto near = fitted_near(seen, last_)) fits = {*near};
-  last_.reset();
-  if (fits.empty()) fits = tracker::minima(seen);
+  if (const auto near = fitted_near(corners, last_pose_)) fits = {*near};
+  last_pose_.reset();
+  if (fits.empty()) fits = tracker::minima(corners);
   constexpr const char* k_go_nearer = "The markers in view are too small or too steep: go nearer.";
   if (fits.empty()) return without_pose(k_go_nearer);
   PoseFit fit = fits.front();
-  const BodyCorrespondences kept = without_moved(seen, fit.world_from_body);
-  if (kept.size() < seen.size() && !kept.empty())
+  const BodyCorrespondences kept = without_moved(corners, fit.world_from_body);
+  if (kept.size() < corners.size() && !kept.empty())
     if (const auto again = tracker::fit_pose(tracker::corners_at(kept, fit.world_from_body).observations,
                                              fit.world_from_body, tracker::k_huber))
       fit = *again;
   if (kept.size() < 2 && fits.size() > 1 && fits[1].chi_square - fits[0].chi_square < k_min_chi_square_gap)
     return without_pose("One marker alone does not tell the place for sure: bring a second one into view.");
-  if (!(position_stddev_px(camera, fit, kept.empty() ? seen : kept) < k_max_stddev_px))
+  if (!(position_stddev_px(camera, fit, kept.empty() ? corners : kept) < k_max_stddev_px))
     return without_pose(k_go_nearer);
   out.markers = static_cast<int>(kept.size());
   out.rms_px = fit.rms_px;
-  const double gate_px = gate_of(seen, fit.world_from_body);
+  const double gate_px = gate_of(corners, fit.world_from_body);
   camera.imager_from_world = fit.world_from_body;  // `view` and `fit` had the camera at the origin
   out.moved = moved_markers(camera, gate_px, detections, bodies, tracks);
   collect_views(camera, detections, bodies, tracks);
-  last_ = camera.imager_from_world;
+  last_pose_ = camera.imager_from_world;
   out.view = std::move(camera);
   return out;
 }

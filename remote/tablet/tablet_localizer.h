@@ -66,7 +66,7 @@ class TabletLocalizer {
   tracker::Detector detector_;
   std::vector<Aspect> aspects_;         // in the order of their last use
   int width_ = 0;                       // width of the last image, px
-  std::optional<Pose> last_;            // camera_from_world of the last image, if it was found
+  std::optional<Pose> last_pose_;       // camera_from_world of the last image, if it was found
   std::vector<calib::BodyView> views_;  // bodies in the last image, for update_intrinsics()
 };
 

@@ -310,14 +310,14 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   apps::SessionDevices devices;
   devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
   for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
-  // Meanwhile guests are answered, and told how far it is.
+  // Meanwhile guests are answered, and progress how far it is.
   ASSERT_TRUE(make_folder(folder / "page").ok());
   ASSERT_TRUE(write_file(folder / "page/index.html", "<title>Limn</title>").ok());
   const auto server = Server::open({.at = "0", .page = folder / "page", .keys = {}}, {}).value();
   ASSERT_TRUE(session->edit({"repair", "", ""}, "test", {}));
   std::atomic<bool> is_ended = false;
   double longest_s = 0, repair_s = 0;
-  std::set<std::string> told;
+  std::set<std::string> progress;
   std::thread guest([&] {
     const auto ask = [&](const std::string& path, const nlohmann::json& body, const std::string& token) {
       return nlohmann::json::parse(test::RemoteClient(server->port()).post(path, body.dump(), token).body);
@@ -325,11 +325,11 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
     const std::string token = ask("/api/pair", {{"pin", server->invitation().pins[2]}}, "")["token"];
     const auto begun = std::chrono::steady_clock::now();
     for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i) {
-      const auto asked = std::chrono::steady_clock::now();
+      const auto requested_at = std::chrono::steady_clock::now();
       (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
-      longest_s = std::max(longest_s, seconds_between(asked, std::chrono::steady_clock::now()));
+      longest_s = std::max(longest_s, seconds_between(requested_at, std::chrono::steady_clock::now()));
       const std::string state = test::RemoteClient(server->port()).get("/api/state", token).body;
-      told.insert(nlohmann::json::parse(state)["repair"]);
+      progress.insert(nlohmann::json::parse(state)["repair"]);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     repair_s = seconds_between(begun, std::chrono::steady_clock::now());
@@ -343,8 +343,8 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   ASSERT_TRUE(output->close(&*session, false).ok());
   std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
   EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
-  EXPECT_TRUE(told.contains("computing"));
-  EXPECT_GT(std::count_if(told.begin(), told.end(),
+  EXPECT_TRUE(progress.contains("computing"));
+  EXPECT_GT(std::count_if(progress.begin(), progress.end(),
                           [](const std::string& words) { return words.ends_with(" patterns"); }),
             3);
   EXPECT_EQ(session->recalibration_progress(), "");

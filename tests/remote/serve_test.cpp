@@ -209,14 +209,14 @@ TEST_F(AServer, AThousandConnectionsAreShedAndOthersServed) {
   const auto before = guest(Role::look);
   std::vector<std::unique_ptr<RemoteClient>> crowd;
   for (int i = 0; i < 1000; ++i) crowd.push_back(client());
-  int told = 0;
+  int refused = 0;
   for (const auto& each : crowd) {
     each->send("GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     const int status = each->answer().status;
     EXPECT_TRUE(status == 200 || status == 503 || status == 0) << status;
-    told += status == 503;
+    refused += status == 503;
   }
-  EXPECT_GE(told, 16) << "some are told why";
+  EXPECT_GE(refused, 16) << "some are told why";
   // Who was there before was served meanwhile, and there is room again.
   EXPECT_TRUE(before->send_text("not JSON"));
   EXPECT_TRUE(before->message_of("refused"));

@@ -71,14 +71,14 @@ class Room {
   }
 
   struct Window {
-    json said;
+    json reply;
     cv::Mat image;
     std::vector<std::uint8_t> jpeg;
     std::optional<Eigen::Vector3d> p_viewpoint_world;
   };
-  Window look(const std::string& device,
-              std::vector<std::uint8_t> jpeg,
-              TabletViewMode parts = TabletViewMode::as_screen) {
+  Window draw_window(const std::string& device,
+                     std::vector<std::uint8_t> jpeg,
+                     TabletViewMode parts = TabletViewMode::as_screen) {
     std::promise<CompositeImage> answered;
     tablet_view_->draw_window({device, "", parts}, std::move(jpeg),
                               [&](CompositeImage seen) { answered.set_value(std::move(seen)); });
@@ -120,10 +120,10 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world, const scene::P
   return points;
 }
 
-Imager view_of(const json& said, const Imager& truth) {
+Imager view_of(const json& reply, const Imager& truth) {
   Imager view = truth;
-  view.lens = Lens::create(said["lens"]["model"], said["lens"]["values"]).value();
-  view.imager_from_world = pose_of(said["view_from_world"]);
+  view.lens = Lens::create(reply["lens"]["model"], reply["lens"]["values"]).value();
+  view.imager_from_world = pose_of(reply["view_from_world"]);
   return view;
 }
 
@@ -150,9 +150,9 @@ TEST(Tablet, PartAndImageLieOnEachOtherAfterTenSecondsOfLookingRound) {
   int count = 0, judged = 0;
   for (int i = 0; i < 100; ++i) {
     const test::TabletShot shot = tablet.shoot(0.1 * i);
-    const Room::Window window = room.look(k_tablet, shot.jpeg);
-    ASSERT_EQ(window.said["sees"], "prototype") << i << ": " << window.said.dump();
-    const Imager view = view_of(window.said, shot.camera);
+    const Room::Window window = room.draw_window(k_tablet, shot.jpeg);
+    ASSERT_EQ(window.reply["sees"], "prototype") << i << ": " << window.reply.dump();
+    const Imager view = view_of(window.reply, shot.camera);
     double here = 0;
     int seen = 0;
     for (const Eigen::Vector3d& p : points) {
@@ -164,12 +164,12 @@ TEST(Tablet, PartAndImageLieOnEachOtherAfterTenSecondsOfLookingRound) {
     if (i >= 80) squares += here, count += seen;
     // The focal length is as sure as it says it is.
     const double focal_off = view.lens.fx() - shot.camera.lens.fx();
-    EXPECT_LT(std::abs(focal_off), 4 * window.said["lens"]["focal_stddev_px"].get<double>() + 0.15) << i;
+    EXPECT_LT(std::abs(focal_off), 4 * window.reply["lens"]["focal_stddev_px"].get<double>() + 0.15) << i;
     if (i % 33 != 0) continue;
     const double part_px = std::sqrt(here / seen);
     std::printf("%5.1f s: %4.2f px, %d markers, rms %.2f px, focal length %.1f +- %.1f (true %.1f)\n",
-                0.1 * i, part_px, window.said["markers"].get<int>(), window.said["rms_px"].get<double>(),
-                view.lens.fx(), window.said["lens"]["focal_stddev_px"].get<double>(), shot.camera.lens.fx());
+                0.1 * i, part_px, window.reply["markers"].get<int>(), window.reply["rms_px"].get<double>(),
+                view.lens.fx(), window.reply["lens"]["focal_stddev_px"].get<double>(), shot.camera.lens.fx());
     ASSERT_TRUE(write_png(folder / fmt::format("sent-{}.png", i), shot.image));
     ASSERT_TRUE(write_png(folder / fmt::format("seen-{}.png", i), window.image));
     // The mirror that was drawn, and the one that belongs there.
@@ -252,11 +252,11 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   apps::Session& session = room.session();
   const sim::World& world = room.rig().world();
   test::VirtualTablet tablet = room.tablet(6);
-  for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
+  for (int i = 0; i < 4; ++i) room.draw_window(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
   const Eigen::Vector3d p_middle = world.world_from_prototype.translation;
   const Pose aside = looking_at(p_middle + Eigen::Vector3d(-0.5, -0.55, 0.1), p_middle, {0, 0, 1});
-  const Room::Window seen = room.look(k_tablet, tablet.shoot_from(aside).jpeg);
-  ASSERT_TRUE(seen.p_viewpoint_world.has_value()) << seen.said.dump();
+  const Room::Window seen = room.draw_window(k_tablet, tablet.shoot_from(aside).jpeg);
+  ASSERT_TRUE(seen.p_viewpoint_world.has_value()) << seen.reply.dump();
   const Eigen::Vector3d p_tablet = aside.inverse().translation,
                         p_own =
                             session.setup().scene.viewers[0].fixed->imager_from_world.inverse().translation;
@@ -329,13 +329,13 @@ TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
     room.tablet_view().update_session(session);
   };
   test::VirtualTablet tablet = room.tablet(7);
-  for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
+  for (int i = 0; i < 4; ++i) room.draw_window(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
   const Eigen::Vector3d p_middle = room.rig().world().world_from_prototype.translation;
   const test::TabletShot shot = tablet.shoot_from(
       looking_at(p_middle + Eigen::Vector3d(-0.1, -0.7, 0.1), p_middle, Eigen::Vector3d::UnitZ()));
   const cv::Mat sent = device::decode_jpeg(shot.jpeg).value();
   const auto shown = [&](const char* name, TabletViewMode parts) {
-    cv::Mat image = room.look(k_tablet, shot.jpeg, parts).image;
+    cv::Mat image = room.draw_window(k_tablet, shot.jpeg, parts).image;
     EXPECT_TRUE(write_png(folder / (std::string(name) + ".png"), image));
     return image;
   };
@@ -392,32 +392,32 @@ TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   Room room(test::test_folder() / "lenses");
   test::VirtualTablet tablet = room.tablet(3);
   const test::TabletShot shot = tablet.shoot(0);
-  const auto said = [&](const std::string& device, std::vector<std::uint8_t> jpeg) {
-    const Room::Window window = room.look(device, std::move(jpeg));
+  const auto reply = [&](const std::string& device, std::vector<std::uint8_t> jpeg) {
+    const Room::Window window = room.draw_window(device, std::move(jpeg));
     EXPECT_TRUE(window.jpeg.empty());
-    EXPECT_EQ(window.said["sees"], "nothing");
-    EXPECT_FALSE(window.said.contains("view_from_world"));
-    return window.said["why"].get<std::string>();
+    EXPECT_EQ(window.reply["sees"], "nothing");
+    EXPECT_FALSE(window.reply.contains("view_from_world"));
+    return window.reply["why"].get<std::string>();
   };
   const std::string text = "<html>not a picture</html>";
-  EXPECT_NE(said(k_tablet, {}).find("something else"), std::string::npos);
-  EXPECT_NE(said(k_tablet, {text.begin(), text.end()}).find("something else"), std::string::npos);
-  EXPECT_NE(said(k_tablet, std::vector<std::uint8_t>(20 << 20, 0xff)).find("at most 4 MB"),
+  EXPECT_NE(reply(k_tablet, {}).find("something else"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, {text.begin(), text.end()}).find("something else"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, std::vector<std::uint8_t>(20 << 20, 0xff)).find("at most 4 MB"),
             std::string::npos);
   std::vector<std::uint8_t> half = shot.jpeg;
   half.resize(half.size() / 2);
-  EXPECT_NE(said(k_tablet, half).find("truncated or damaged"), std::string::npos);
-  EXPECT_NE(said(k_tablet, device::encode_jpeg(cv::Mat(16, 5000, CV_8U, cv::Scalar(9)), 50)).find("5000x16"),
+  EXPECT_NE(reply(k_tablet, half).find("truncated or damaged"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, device::encode_jpeg(cv::Mat(16, 5000, CV_8U, cv::Scalar(9)), 50)).find("5000x16"),
             std::string::npos);
   std::vector<std::uint8_t> scans = shot.jpeg;
   for (int i = 0; i < 500; ++i) scans.insert(scans.end(), {0xff, 0xda});
-  EXPECT_NE(said(k_tablet, scans).find("scans"), std::string::npos);
-  EXPECT_NE(said("../../etc", shot.jpeg).find("device"), std::string::npos);
-  EXPECT_NE(said(k_tablet, device::encode_jpeg(cv::Mat(1, 1, CV_8U, cv::Scalar(9)), 50)).find("No markers"),
+  EXPECT_NE(reply(k_tablet, scans).find("scans"), std::string::npos);
+  EXPECT_NE(reply("../../etc", shot.jpeg).find("device"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, device::encode_jpeg(cv::Mat(1, 1, CV_8U, cv::Scalar(9)), 50)).find("No markers"),
             std::string::npos);
   // A wall: no markers. The room's image stands in.
   const Pose aside = looking_at({0, -1, 0.5}, {0, -3, 0.5}, Eigen::Vector3d::UnitZ());
-  EXPECT_NE(said(k_tablet, tablet.shoot_from(aside).jpeg).find("No markers"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, tablet.shoot_from(aside).jpeg).find("No markers"), std::string::npos);
   std::promise<CompositeImage> answered;
   room.tablet_view().draw_room([&](CompositeImage seen) { answered.set_value(std::move(seen)); });
   const CompositeImage seen = answered.get_future().get();
@@ -427,10 +427,10 @@ TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   EXPECT_EQ(image->size(), cv::Size(960, 540));
   ASSERT_TRUE(write_png(test::test_folder() / "room.png", *image));
   // After all that an image is an image; a large one comes back smaller.
-  EXPECT_EQ(room.look(k_tablet, shot.jpeg).image.size(), cv::Size(k_width, k_height));
+  EXPECT_EQ(room.draw_window(k_tablet, shot.jpeg).image.size(), cv::Size(k_width, k_height));
   test::VirtualTablet large = room.tablet(3, 2560, 1600);
-  const Room::Window window = room.look(k_tablet, large.shoot(0).jpeg);
-  EXPECT_EQ(window.said["sees"], "prototype") << window.said.dump();
+  const Room::Window window = room.draw_window(k_tablet, large.shoot(0).jpeg);
+  EXPECT_EQ(window.reply["sees"], "prototype") << window.reply.dump();
   EXPECT_EQ(window.image.size(), cv::Size(1280, 800));
 }
 
@@ -443,7 +443,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   constexpr int k_images = 12;
   struct Answers {
     std::mutex mutex;
-    std::vector<std::vector<json>> said = std::vector<std::vector<json>>(2 * k_images);
+    std::vector<std::vector<json>> reply = std::vector<std::vector<json>>(2 * k_images);
     int count = 0;
   } answers;
   for (int i = 0; i < 2 * k_images; ++i) {
@@ -452,7 +452,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
         {is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
         [&answers, i](CompositeImage seen) {
           const std::lock_guard lock(answers.mutex);
-          answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
+          answers.reply[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
           ++answers.count;
         });
   }
@@ -463,15 +463,15 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   }
   int drawn = 0;
   for (int i = 0; i < 2 * k_images; ++i) {
-    const auto& said = answers.said[static_cast<std::size_t>(i)];
-    ASSERT_EQ(said.size(), 1u) << i;
-    if (said[0]["sees"] == "nothing") {
+    const auto& reply = answers.reply[static_cast<std::size_t>(i)];
+    ASSERT_EQ(reply.size(), 1u) << i;
+    if (reply[0]["sees"] == "nothing") {
       EXPECT_LT(i, 2 * k_images - 2) << "the newest";
       continue;
     }
     ++drawn;
     const Imager& truth = (i % 2 == 0 ? one : other).camera;
-    EXPECT_TRUE(test::pose_near(pose_of(said[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
+    EXPECT_TRUE(test::pose_near(pose_of(reply[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
   }
   EXPECT_LT(drawn, 2 * k_images);
   // What still waits at the end is told so.
