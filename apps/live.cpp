@@ -136,19 +136,20 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
 }
 
 // Opens the remote; null if it is not asked for.
-Result<std::unique_ptr<Server>> served(const LiveOptions& options, const SessionSetup& setup) {
-  if (options.serve.empty()) return std::unique_ptr<Server>();
+Result<std::unique_ptr<remote::Server>> served(const LiveOptions& options, const SessionSetup& setup) {
+  if (options.serve.empty()) return std::unique_ptr<remote::Server>();
   if (!options.serve_show.empty() && !find_named(setup.rig.projectors, options.serve_show))
     return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.",
                        joined_names(setup.rig.projectors), options.serve_show);
-  ServeOptions serve;
+  remote::ServeOptions serve;
   serve.at = options.serve;
   LIMN_TRY(const fs::path own, user_folder());
-  auto tablet_view = TabletView::create(setup, own / "lenses");
+  auto tablet_view = remote::TabletView::create(setup, own / "lenses");
   if (!tablet_view) log_warning("live: the remote shows no live images: {}", tablet_view.message());
-  LIMN_TRY(std::unique_ptr<Server> server,
-           Server::open(serve, tablet_view ? image_providers(std::move(*tablet_view)) : ImageProviders{}));
-  if (!options.serve_show.empty()) server->show_code(options.serve_show, Role::work);
+  LIMN_TRY(std::unique_ptr<remote::Server> server,
+           remote::Server::open(serve, tablet_view ? remote::image_providers(std::move(*tablet_view))
+                                                   : remote::ImageProviders{}));
+  if (!options.serve_show.empty()) server->show_code(options.serve_show, scene::Role::work);
   return server;
 }
 
@@ -172,7 +173,7 @@ Status played(const LiveOptions& options,
   LIMN_TRY(context, device::GlContext::create());
   log_info("live: {}", context->description());
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
-  LIMN_TRY(const std::unique_ptr<Server> server, served(options, setup));
+  LIMN_TRY(const std::unique_ptr<remote::Server> server, served(options, setup));
   LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
   tell(skipped_variants, {}, &output.telemetry());
   LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));

@@ -6,23 +6,23 @@
 
 #include "remote/pairing_overlay.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
-constexpr double k_code_share = 0.5;  // of a projector's shorter side, without a prototype
-constexpr std::chrono::milliseconds k_between_searches{300}, k_longest_search{2000};
-constexpr int k_pin_px = 360;            // a PIN's sign, as it is kept
-constexpr double k_least_pin_px = 50;    // in the projector's image
-constexpr int k_dark = 8;                // display value
-constexpr int k_code_module_px = 12;     // of the code, as it is kept
-constexpr double k_least_module_px = 2;  // of the projector's image, that a phone still reads
-constexpr double k_code_light = 0.75;    // display value: white paper would outshine all else
+constexpr double k_code_share = 0.5;  // the code's share of the image's shorter side, without a prototype
+constexpr std::chrono::milliseconds k_search_interval{300}, k_search_timeout{2000};
+constexpr int k_pin_px = 360;            // width of the PIN's sign before it is placed
+constexpr double k_least_pin_px = 50;    // smallest width of the PIN's sign in the projector's image
+constexpr int k_dark = 8;                // display value; brighter pixels belong to a part
+constexpr int k_code_module_px = 12;     // module of the code before it is placed
+constexpr double k_least_module_px = 2;  // smallest module in the projector's image that phones read
+constexpr double k_code_light = 0.75;    // display value; full white would outshine everything else
 
-// Where the prototype is free of markers and, if there is room, of parts.
-std::optional<OverlayPlace> free_place(Session* session,
-                                       std::size_t projector,
-                                       cv::Size shape,
-                                       double least_px) {
+// A place on the prototype without markers and, if there is room, without parts.
+std::optional<apps::OverlayPlace> free_place(apps::Session* session,
+                                             std::size_t projector,
+                                             cv::Size shape,
+                                             double least_px) {
   cv::Mat points = session->free_surface(projector);
   if (points.empty() || shape.empty()) return std::nullopt;
   const Rig& rig = session->setup().rig;
@@ -46,52 +46,53 @@ std::optional<OverlayPlace> free_place(Session* session,
 
 void ProjectedCode::show(const std::string& projector,
                          Text text,
-                         std::function<void(Clock::time_point until)> begun) {
+                         std::function<void(Clock::time_point until)> on_shown) {
   end();
   projector_ = projector;
   text_ = std::move(text);
-  begun_ = std::move(begun);
+  on_shown_ = std::move(on_shown);
 }
 
 void ProjectedCode::end() {
   projector_.clear();
-  asked_ = searched_ = until_ = std::nullopt;
+  requested_at_ = searched_at_ = shown_until_ = std::nullopt;
   sign_ = cv::Mat();
   place_.reset();
 }
 
-// It begins with a place for it; after a while without one, too: the prototype may not be seen.
-bool ProjectedCode::has_begun(Session* session, std::size_t projector) {
-  if (until_) return true;
+// Starts the code's time when there is a place for it. After k_search_timeout it starts without one, since
+// the prototype may not be tracked. Returns whether the code is shown.
+bool ProjectedCode::start_if_due(apps::Session* session, std::size_t projector) {
+  if (shown_until_) return true;
   const auto now = Clock::now();
-  if (!asked_) {
-    asked_ = now;
+  if (!requested_at_) {
+    requested_at_ = now;
     sign_ = k_code_light * pairing_code_image(text_.url, text_.pin, text_.role, k_code_module_px);
   }
-  if (searched_ && now - *searched_ < k_between_searches) return false;
-  searched_ = now;
+  if (searched_at_ && now - *searched_at_ < k_search_interval) return false;
+  searched_at_ = now;
   place_ = free_place(session, projector, sign_.size(), k_least_module_px * sign_.cols / k_code_module_px);
-  if (!place_ && now - *asked_ < k_longest_search) return false;
+  if (!place_ && now - *requested_at_ < k_search_timeout) return false;
   if (!place_) {
     const cv::Mat smaller = k_code_light * pin_image(text_.pin, text_.role, k_pin_px);
     place_ = free_place(session, projector, smaller.size(), k_least_pin_px);
     if (place_) sign_ = smaller;
   }
-  until_ = now + duration_;
-  begun_(*until_);
+  shown_until_ = now + duration_;
+  on_shown_(*shown_until_);
   return true;
 }
 
-std::vector<Overlay> ProjectedCode::overlays(Session* session) {
+std::vector<apps::Overlay> ProjectedCode::overlays(apps::Session* session) {
   const std::vector<Imager>& projectors = session->setup().rig.projectors;
   const auto imager = std::find_if(projectors.begin(), projectors.end(),
                                    [&](const Imager& p) { return p.name == projector_; });
   if (imager == projectors.end() || session->show_state().blackout) return {};
   const auto projector = static_cast<std::size_t>(imager - projectors.begin());
-  if (!has_begun(session, projector)) return {};
-  if (Clock::now() >= *until_) end();
+  if (!start_if_due(session, projector)) return {};
+  if (Clock::now() >= *shown_until_) end();
   if (sign_.empty()) return {};
-  SignOverlay overlay{projector, sign_, place_};
+  apps::SignOverlay overlay{projector, sign_, place_};
   if (!place_) {
     const int module_px = static_cast<int>(k_code_share * std::min(imager->width, imager->height) *
                                            k_code_module_px / sign_.cols);
@@ -102,4 +103,4 @@ std::vector<Overlay> ProjectedCode::overlays(Session* session) {
   return {overlay};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

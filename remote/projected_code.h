@@ -10,41 +10,43 @@
 #include "session/overlays.h"
 #include "session/session.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
-/// A code for guests in a projector's light, for a while: its image, and a place for it on the prototype. The
-/// session's frame loop draws it; what guests and recordings get stays what was painted.
+/// The pairing code in a projector's light, for a limited time: its image, and its place on the prototype.
+/// The session's frame loop draws it as an overlay, so that recordings and the images that guests get do not
+/// show it. Belongs to the session's thread.
 class ProjectedCode {
  public:
   using Clock = std::chrono::steady_clock;
-  /// What the code says, and what stands below it.
+  /// The code's text, and the text below it.
   struct Text {
     std::string url, pin, role;
   };
 
-  /// How long it is shown.
+  /// Sets how long the code is shown.
   void set_duration(std::chrono::milliseconds duration) { duration_ = duration; }
-  /// From the next frame on a projector shows this code; no other one does then. `begun` is told, when it is
-  /// seen first, until when.
-  void show(const std::string& projector, Text text, std::function<void(Clock::time_point until)> begun);
-  /// Who shows it; empty: nobody.
+  /// Has a projector show a code from the next frame on; any other projector stops. `on_shown` is called when
+  /// the code is first shown, with the time of its end.
+  void show(const std::string& projector, Text text, std::function<void(Clock::time_point until)> on_shown);
+  /// The projector that shows the code; empty: none.
   const std::string& projector() const { return projector_; }
 
-  /// The code on the largest flat and free piece of the prototype (in the image's middle, where there is
-  /// none). Nothing under a blackout, and when it is over.
-  std::vector<Overlay> overlays(Session* session);
+  /// The code, on the largest flat and free piece of the prototype, or in the middle of the image if there is
+  /// none. Empty during a blackout and when the time is over.
+  std::vector<apps::Overlay> overlays(apps::Session* session);
 
  private:
-  bool has_begun(Session* session, std::size_t projector);
+  bool start_if_due(apps::Session* session, std::size_t projector);
   void end();
 
   std::chrono::milliseconds duration_{};
   std::string projector_;
   Text text_;
-  std::function<void(Clock::time_point)> begun_;
-  std::optional<Clock::time_point> asked_, searched_, until_;  // none before the first frame
+  std::function<void(Clock::time_point)> on_shown_;
+  std::optional<Clock::time_point> requested_at_, searched_at_,
+      shown_until_;  // nullopt before the first frame
   cv::Mat sign_;
-  std::optional<OverlayPlace> place_;  // on the prototype
+  std::optional<apps::OverlayPlace> place_;  // its place on the prototype
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

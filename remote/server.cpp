@@ -4,27 +4,27 @@
 
 #include "core/log.h"
 #include "core/user_folder.h"
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::milliseconds k_between_news{50}, k_between_unwatched{1000}, k_longest_hearing{5};
+constexpr std::chrono::milliseconds k_publish_interval{50}, k_unwatched_publish_interval{1000};
+constexpr std::chrono::milliseconds k_edit_time_budget{5};  // for edits, in one frame
+constexpr std::chrono::seconds k_camera_delay{2};           // images of cameras may show a code for so long
 
-constexpr std::chrono::seconds k_cameras_late{2};  // after which no image shows a code any more
-
-bool is_late(const Wish& wish, std::chrono::steady_clock::time_point now) {
-  return now - wish.since >= k_longest_wish;
+bool is_expired(const EditRequest& request, std::chrono::steady_clock::time_point now) {
+  return now - request.requested_at >= k_edit_timeout;
 }
 
-// What the certificate is for: however people may call this machine.
-std::vector<std::string> names_of(const std::string& host) {
+// All names and addresses by which people may reach this machine.
+std::vector<std::string> certificate_hosts(const std::string& host) {
   std::vector<std::string> names = {"localhost", "127.0.0.1", "::1"};
-  if (!is_any(host)) names.push_back(host);
+  if (!is_unspecified(host)) names.push_back(host);
   for (const std::string& address : own_addresses()) names.push_back(address);
-  if (const std::string name = own_name(); !name.empty()) {
+  if (const std::string name = own_host_name(); !name.empty()) {
     names.push_back(name);
     names.push_back(name + ".local");
   }
@@ -33,10 +33,10 @@ std::vector<std::string> names_of(const std::string& host) {
   return names;
 }
 
-// Under which address other machines reach it.
+// The host part of a URL by which other machines reach this one.
 std::string shown_host(const std::string& host) {
   std::string shown = host;
-  if (is_any(host)) {
+  if (is_unspecified(host)) {
     const std::vector<std::string> own = own_addresses();
     shown = own.empty() ? "127.0.0.1" : own.front();
   }
@@ -49,17 +49,42 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
   if (keys.empty()) {
     LIMN_TRY(keys, user_folder());
   }
-  LIMN_TRY(Certificate made, certificate_in(keys, names_of(host)));
+  LIMN_TRY(Certificate made, load_or_create_certificate(keys, certificate_hosts(host)));
   return std::optional(std::move(made));
 }
 
 }  // namespace
 
+RequestHandler::Setup Server::handler_setup(const std::string& host,
+                                            const std::optional<Certificate>& certificate) {
+  return {.authentication = {.is_encrypted = certificate.has_value(),
+                             .is_loopback = is_loopback(host),
+                             .cookie = fmt::format("limn-{}", network_->port())},
+          .authority = certificate ? certificate->authority : "",
+          .files = {},
+          .providers = {},
+          .worker = &worker_,
+          .submit_edit =
+              [this](EditRequest request) {
+                const std::lock_guard lock(mutex_);
+                std::erase_if(edit_requests_,
+                              [&](const EditRequest& old) { return is_expired(old, request.requested_at); });
+                edit_requests_.push_back(std::move(request));
+              },
+          .set_viewpoint =
+              [this](const std::string& guest, const std::optional<Eigen::Vector3d>& p_viewpoint_world) {
+                const std::lock_guard lock(mutex_);
+                viewpoints_[guest] = p_viewpoint_world;
+              },
+          .set_has_guests = [this](bool has_guests) { has_guests_ = has_guests; },
+          .post = [network = network_.get()](std::function<void()> job) { network->post(std::move(job)); }};
+}
+
 Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageProviders providers) {
   const auto named = [](const Error& problem) {
     return Error{fmt::format("--serve: {}", problem.message), problem.wrong_usage};
   };
-  const auto place = net_place(options.at, "127.0.0.1", true);
+  const auto place = apps::net_place(options.at, "127.0.0.1", true);
   if (!place) return named(place.error());
   auto files =
       StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);
@@ -70,46 +95,31 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   if (!network) return named(network.error());
   std::unique_ptr<Server> out(new Server());
   out->network_ = std::move(*network);
-  out->know_ = providers.know;
-  out->code_.set_duration(options.code_lasts);
-  Server* server = out.get();
-  out->reception_ = std::make_unique<Reception>(Reception::Setup{
-      .is_encrypted = certificate->has_value(),
-      .is_loopback = is_loopback(place->host),
-      .authority = certificate->has_value() ? (*certificate)->authority : "",
-      .cookie = fmt::format("limn-{}", out->network_->port()),
-      .files = std::move(*files),
-      .providers = std::move(providers),
-      .worker = &out->worker_,
-      .wish =
-          [server](Wish wish) {
-            const std::lock_guard lock(server->mutex_);
-            std::erase_if(server->wishes_, [&](const Wish& old) { return is_late(old, wish.since); });
-            server->wishes_.push_back(std::move(wish));
-          },
-      .place =
-          [server](const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world) {
-            const std::lock_guard lock(server->mutex_);
-            server->places_[guest] = p_eye_world;
-          },
-      .watched = [server](bool is_watched) { server->is_watched_ = is_watched; },
-      .post = [network = out->network_.get()](std::function<void()> job) { network->post(std::move(job)); }});
-  const bool is_encrypted = certificate->has_value();
-  out->invitation_ = {fmt::format("{}://{}:{}/", is_encrypted ? "https" : "http", shown_host(place->host),
-                                  out->network_->port()),
-                      is_encrypted ? (*certificate)->fingerprint : "",
-                      is_encrypted ? (*certificate)->authority_fingerprint : "",
-                      out->reception_->guests().pins()};
-  const Invitation& told = out->invitation_;
-  log_info("live: the remote is at {}", told.url);
-  if (is_encrypted) {
-    log_info("live: its certificate's SHA-256 is {}", told.fingerprint);
-    log_info("live: that of limn.crt, for devices that shall trust it, is {}", told.authority_fingerprint);
-  }
-  log_info("live: PINs of the remote: look {}, work {}, operate {}", told.pins[0], told.pins[1],
-           told.pins[2]);
-  out->network_->start(out->reception_.get());
+  out->update_providers_ = providers.update_session;
+  out->code_.set_duration(options.code_duration);
+  RequestHandler::Setup setup = out->handler_setup(place->host, *certificate);
+  setup.files = std::move(*files);
+  setup.providers = std::move(providers);
+  out->handler_ = std::make_unique<RequestHandler>(std::move(setup));
+  out->invite_guests(place->host, *certificate);
+  out->network_->start(out->handler_.get());
   return out;
+}
+
+// Makes the invitation and logs it.
+void Server::invite_guests(const std::string& host, const std::optional<Certificate>& certificate) {
+  invitation_ = {
+      fmt::format("{}://{}:{}/", certificate ? "https" : "http", shown_host(host), network_->port()),
+      certificate ? certificate->fingerprint : "", certificate ? certificate->authority_fingerprint : "",
+      handler_->sessions().pins()};
+  log_info("live: the remote is at {}", invitation_.url);
+  if (certificate) {
+    log_info("live: its certificate's SHA-256 is {}", invitation_.fingerprint);
+    log_info("live: that of limn.crt, for devices that shall trust it, is {}",
+             invitation_.authority_fingerprint);
+  }
+  const auto& pins = invitation_.pins;
+  log_info("live: PINs of the remote: look {}, work {}, operate {}", pins[0], pins[1], pins[2]);
 }
 
 Server::~Server() { stop(); }
@@ -117,73 +127,84 @@ Server::~Server() { stop(); }
 void Server::stop() {
   if (!network_) return;
   network_->stop();
-  know_ = {};
-  if (reception_) reception_->blind();
+  update_providers_ = {};
+  if (handler_) handler_->release_image_providers();
   worker_.close();
 }
 
-std::optional<Wish> Server::next_wish() {
+std::optional<EditRequest> Server::next_edit_request() {
   const std::lock_guard lock(mutex_);
-  if (wishes_.empty()) return std::nullopt;
-  Wish wish = std::move(wishes_.front());
-  wishes_.pop_front();
-  return wish;
+  if (edit_requests_.empty()) return std::nullopt;
+  EditRequest request = std::move(edit_requests_.front());
+  edit_requests_.pop_front();
+  return request;
 }
 
-void Server::hear(Session* session, Stamp at) {
+void Server::apply_edits(apps::Session* session, Stamp at) {
   const auto begun = Clock::now();
-  std::map<std::string, std::optional<Eigen::Vector3d>> places;
+  std::map<std::string, std::optional<Eigen::Vector3d>> viewpoints;
   {
     const std::lock_guard lock(mutex_);
-    places.swap(places_);
+    viewpoints.swap(viewpoints_);
   }
-  for (const auto& [guest, p_eye_world] : places) session->see(guest, p_eye_world, at);
-  for (std::size_t i = 0; i < k_most_at_once && Clock::now() - begun < k_longest_hearing; ++i) {
-    const auto wish = next_wish();
-    if (!wish) break;
-    if (is_late(*wish, Clock::now())) continue;
-    const Status done = session->edit(wish->edit, wish->who, at);
-    outcomes_.push_back({wish->number, done ? "" : done.message()});
+  for (const auto& [guest, p_viewpoint_world] : viewpoints) session->see(guest, p_viewpoint_world, at);
+  for (std::size_t i = 0; i < k_max_edits_at_once && Clock::now() - begun < k_edit_time_budget; ++i) {
+    const auto request = next_edit_request();
+    if (!request) break;
+    if (is_expired(*request, Clock::now())) continue;
+    const Status done = session->edit(request->edit, request->who, at);
+    edit_results_.push_back({request->number, done ? "" : done.message()});
   }
 }
 
-void Server::hear(const SessionMoment& moment) {
-  hear(&moment.session, moment.at);
-  tell(moment.session, moment.telemetry, moment.health, moment.at);
+void Server::hear(const apps::SessionMoment& moment) {
+  apply_edits(&moment.session, moment.at);
+  publish_state(moment.session, moment.telemetry, moment.health, moment.at);
 }
 
-std::vector<Overlay> Server::overlays(Session* session) { return code_.overlays(session); }
+std::vector<apps::Overlay> Server::overlays(apps::Session* session) { return code_.overlays(session); }
 
 void Server::show_code(const std::string& projector, Role role) {
   const std::string& pin = invitation_.pins[static_cast<std::size_t>(role)];
   code_.show(projector, {invitation_.url_for(role), pin, name_of(role)},
              [this, role](std::chrono::steady_clock::time_point until) {
-               network_->post([this, role, until] { reception_->hide_room(role, until + k_cameras_late); });
+               network_->post([this, role, until] { handler_->hide_room(role, until + k_camera_delay); });
              });
   log_info("live: {} shows the code of the remote for {}", projector, name_of(role));
 }
 
-void Server::tell(const Session& session, const Telemetry& telemetry, const DeviceHealth& health, Stamp at) {
+void Server::publish_state(const apps::Session& session,
+                           const apps::Telemetry& telemetry,
+                           const apps::DeviceHealth& health,
+                           Stamp at) {
   if (!begun_at_) begun_at_ = at;
-  if (know_) know_(session);
-  if (session.is_writing()) return;  // what people ask for as soon as they are told must be on the disk
+  if (update_providers_) update_providers_(session);
+  // Files that the state mentions must be complete on the disk, since guests may request them at once.
+  if (session.is_writing()) return;
   const auto now = Clock::now();
   const std::size_t edits = session.last_edit() ? session.last_edit()->count : 0;
-  const bool is_due = !told_at_ || !outcomes_.empty() || edits != told_edits_ ||
-                      now - *told_at_ >= (is_watched_ ? k_between_news : k_between_unwatched);
+  const bool is_due =
+      !published_at_ || !edit_results_.empty() || edits != published_edits_ ||
+      now - *published_at_ >= (has_guests_ ? k_publish_interval : k_unwatched_publish_interval);
   if (!is_due) return;
-  told_at_ = now;
-  told_edits_ = edits;
+  published_at_ = now;
+  published_edits_ = edits;
   if (scenes_ != session.scenes()) {
     scene_ = std::make_shared<const scene::Scene>(session.setup().scene);
     scenes_ = session.scenes();
   }
-  SessionNews news{state_of(session, telemetry, health, *begun_at_), session.painted().projectors,
-                   session.show_state().looks, scene_, std::exchange(outcomes_, {})};
+  hand_over_news({session_state(session, telemetry, health, *begun_at_), session.painted().projectors,
+                  session.show_state().looks, scene_, std::exchange(edit_results_, {})});
+}
+
+// Hands news to the network's thread. News that it has not taken yet are replaced; their edit results are
+// kept.
+void Server::hand_over_news(SessionNews news) {
   {
     const std::lock_guard lock(mutex_);
-    if (news_)  // not taken yet
-      news.outcomes.insert(news.outcomes.begin(), news_->outcomes.begin(), news_->outcomes.end());
+    if (news_)
+      news.edit_results.insert(news.edit_results.begin(), news_->edit_results.begin(),
+                               news_->edit_results.end());
     news_ = std::move(news);
     if (std::exchange(is_news_posted_, true)) return;
   }
@@ -194,8 +215,8 @@ void Server::tell(const Session& session, const Telemetry& telemetry, const Devi
       newest = std::exchange(news_, std::nullopt);
       is_news_posted_ = false;
     }
-    if (newest) reception_->take(std::move(*newest));
+    if (newest) handler_->update_news(std::move(*newest));
   });
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

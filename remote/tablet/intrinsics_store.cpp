@@ -7,13 +7,13 @@
 #include "core/file.h"
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr const char* k_lenses_schema = "limn.guest_lens/1";
-constexpr std::size_t k_most_devices = 200, k_most_lenses = 4;
+constexpr std::size_t k_max_devices = 200, k_max_lenses = 4;
 
 fs::path file_of(const fs::path& folder, const std::string& device) { return folder / (device + ".json"); }
 
@@ -26,7 +26,7 @@ Result<std::vector<calib::IntrinsicsEstimate>> read(const fs::path& file) {
     calib::IntrinsicsEstimate lens;
     const std::vector<double> size = node.at("size").numbers(2), values = node.at("values").numbers(5),
                               covariance = node.at("covariance").numbers(25);
-    if (size.size() != 2 || values.size() != 5 || covariance.size() != 25) break;  // told by status()
+    if (size.size() != 2 || values.size() != 5 || covariance.size() != 25) break;  // status() has the error
     lens.width = static_cast<int>(std::clamp(size[0], 0.0, 1e5));
     lens.height = static_cast<int>(std::clamp(size[1], 0.0, 1e5));
     lens.values = Eigen::Map<const calib::Vector5d>(values.data());
@@ -39,16 +39,16 @@ Result<std::vector<calib::IntrinsicsEstimate>> read(const fs::path& file) {
   return lenses;
 }
 
-// Keeps the newest.
-void make_room(const fs::path& folder) {
+// Keeps the newest k_max_devices files.
+void remove_oldest_files(const fs::path& folder) {
   std::error_code ignored;
   std::vector<std::pair<fs::file_time_type, fs::path>> files;
   for (const auto& entry : fs::directory_iterator(folder, ignored))
     if (entry.path().extension() == ".json")
       files.emplace_back(fs::last_write_time(entry.path(), ignored), entry.path());
-  if (files.size() <= k_most_devices) return;
+  if (files.size() <= k_max_devices) return;
   std::sort(files.begin(), files.end());
-  files.resize(files.size() - k_most_devices);
+  files.resize(files.size() - k_max_devices);
   for (const auto& [time, file] : files) fs::remove(file, ignored);
 }
 
@@ -69,7 +69,7 @@ std::vector<calib::IntrinsicsEstimate> load_lenses(const fs::path& folder, const
   if (!fs::exists(file, none)) return {};
   auto lenses = read(file);
   if (lenses) return std::move(*lenses);
-  log_warning("live: {} The lens is found anew.", lenses.message());
+  log_warning("live: {} The lens is estimated anew.", lenses.message());
   return {};
 }
 
@@ -79,7 +79,7 @@ Status save_lenses(const fs::path& folder,
   LIMN_CHECK(is_device_name(device));
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const calib::IntrinsicsEstimate& lens : lenses) {
-    if (list.size() == k_most_lenses) break;
+    if (list.size() == k_max_lenses) break;
     list.push_back({{"size", {lens.width, lens.height}},
                     {"values", std::vector<double>(lens.values.begin(), lens.values.end())},
                     {"covariance", std::vector<double>(lens.covariance.reshaped().begin(),
@@ -89,8 +89,8 @@ Status save_lenses(const fs::path& folder,
   LIMN_TRY_STATUS(make_folder(folder));
   const nlohmann::ordered_json json = {{"schema", k_lenses_schema}, {"lenses", list}};
   LIMN_TRY_STATUS(write_file(file_of(folder, device), json.dump(1) + "\n"));
-  make_room(folder);
+  remove_oldest_files(folder);
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -6,16 +6,16 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
-constexpr std::size_t k_most_guest_bytes = 4 << 20;
-constexpr int k_most_guest_side = 4096;  ///< px, of what is sent
-constexpr int k_drawn_side = 1280;       ///< px: larger images are looked at and drawn smaller
+constexpr std::size_t k_max_tablet_image_bytes = 4 << 20;
+constexpr int k_max_tablet_image_side = 4096;  ///< px, of the image that is sent
+constexpr int k_drawn_side = 1280;             ///< px; larger images are reduced to it before they are used
 
-/// An image that a stranger sent, as 8-bit BGR. The header is judged before anything is decoded: at most
-/// k_most_guest_bytes and k_most_guest_side. Larger than k_drawn_side it comes out smaller (JpegOptions). How
-/// a camera was turned (EXIF) is ignored, as the browser shows frames as they are. Errors, in a guest's
-/// words: no JPEG, too large, damaged, or one that would take long to decode.
+/// Decodes an image from an untrusted sender to 8-bit BGR. The header is checked before anything is decoded:
+/// at most k_max_tablet_image_bytes and k_max_tablet_image_side. An image larger than k_drawn_side is decoded
+/// at a reduced size (JpegOptions). The orientation in EXIF is ignored, since browsers show frames without
+/// it. Errors, in words for a guest: no JPEG, too large, damaged, or one that would take long to decode.
 Result<cv::Mat> decode_tablet_image(std::span<const std::uint8_t> jpeg);
 
-}  // namespace limn::apps
+}  // namespace limn::remote

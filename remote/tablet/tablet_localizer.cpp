@@ -7,23 +7,24 @@
 #include "core/names.h"
 #include "tracker/marker_pose.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
-constexpr int k_lens_side = 1280;                      // px, the longer side that lenses are kept at
-constexpr std::size_t k_most_aspects = 4;              // of one device
-constexpr double k_gate_px = 2, k_gate_of_median = 4;  // markers further off than both were moved
-constexpr double k_sure = 9;  // by so much (chi square) is a lone marker's place likelier than its mirror's
-constexpr double k_most_unsure_px = 8;  // of the place, as it shows at the markers' distance
-constexpr double k_noticed_px = 0.15;   // of a change of the lens, anywhere in the image
-constexpr double k_known_share = 0.03;  // of the focal length: a lens good enough to straighten sides with
-constexpr double k_learnt = 0.8;        // of a deviation: less of it is worth keeping
+constexpr int k_lens_side = 1280;           // px, the longer side of the image size that lenses are kept for
+constexpr std::size_t k_max_aspects = 4;    // aspect ratios of one device
+constexpr double k_gate_px = 2;             // a marker was moved if its residual exceeds this
+constexpr double k_gate_of_median = 4;      // and this multiple of the median residual
+constexpr double k_min_chi_square_gap = 9;  // between a lone marker's pose and its mirrored one
+constexpr double k_max_stddev_px = 8;       // of the pose, as it shows in the image at the markers' distance
+constexpr double k_noticeable_px = 0.15;    // change of the lens anywhere in the image
+constexpr double k_known_share = 0.03;  // of the focal length: below it the lens is used to straighten sides
+constexpr double k_better_share = 0.8;  // of the standard deviation: an improvement that is worth saving
 
 using tracker::BodyCorrespondences;
 using tracker::PoseFit;
 
-// The markers of bodies whose place is known, as one body in the world.
-Body room_of(std::span<const Body> bodies, std::span<const Track> tracks, std::size_t least_markers) {
+// The markers of all bodies with a tracked pose, as one body in the world.
+Body known_markers(std::span<const Body> bodies, std::span<const Track> tracks, std::size_t least_markers) {
   Body room{"room", {}};
   for (const Body& body : bodies)
     for (const Track& track : tracks) {
@@ -37,7 +38,7 @@ Body room_of(std::span<const Body> bodies, std::span<const Track> tracks, std::s
   return room;
 }
 
-// How far off a marker's corners are, RMS px.
+// The RMS residual of a marker's corners, px.
 double misfit(const tracker::MarkerCorrespondences& marker, const Pose& pose) {
   const auto chosen = tracker::corners_at({marker}, pose);
   double squares = 0;
@@ -50,36 +51,37 @@ double misfit(const tracker::MarkerCorrespondences& marker, const Pose& pose) {
                                      : std::sqrt(squares / static_cast<double>(chosen.observations.size()));
 }
 
-double gate_of(const BodyCorrespondences& seen, const Pose& pose) {
+double gate_of(const BodyCorrespondences& corners, const Pose& pose) {
   std::vector<double> off;
-  for (const tracker::MarkerCorrespondences& marker : seen) off.push_back(misfit(marker, pose));
+  for (const tracker::MarkerCorrespondences& marker : corners) off.push_back(misfit(marker, pose));
   return std::max(k_gate_px, k_gate_of_median * median(std::move(off)));
 }
 
-BodyCorrespondences without_moved(const BodyCorrespondences& seen, const Pose& pose) {
-  const double gate = gate_of(seen, pose);
+BodyCorrespondences without_moved(const BodyCorrespondences& corners, const Pose& pose) {
+  const double gate = gate_of(corners, pose);
   BodyCorrespondences kept;
-  for (const tracker::MarkerCorrespondences& marker : seen)
+  for (const tracker::MarkerCorrespondences& marker : corners)
     if (misfit(marker, pose) <= gate) kept.push_back(marker);
   return kept;
 }
 
-// The pose that fits all markers and is not far from the one before, where there are enough of them to leave
-// no doubt: found sooner than from nothing.
-std::optional<PoseFit> fitted_near(const BodyCorrespondences& seen, const std::optional<Pose>& last) {
+// The pose fitted from the last one, if there are enough markers and it fits them all. This is faster than a
+// search from nothing.
+std::optional<PoseFit> fitted_near(const BodyCorrespondences& corners, const std::optional<Pose>& last) {
   constexpr std::size_t k_enough = 4;
   constexpr double k_fits_px = 1;
-  if (!last || seen.size() < k_enough) return std::nullopt;
-  const auto fit = tracker::fit_pose(tracker::corners_at(seen, *last).observations, *last, tracker::k_huber);
+  if (!last || corners.size() < k_enough) return std::nullopt;
+  const auto fit =
+      tracker::fit_pose(tracker::corners_at(corners, *last).observations, *last, tracker::k_huber);
   return fit && fit->rms_px < k_fits_px ? fit : std::nullopt;
 }
 
-// One standard deviation of where a fit puts the middle of what it sees, px.
-double unsure_px(const Imager& camera, const PoseFit& fit, const BodyCorrespondences& seen) {
+// The standard deviation of the projected centre of the markers, px.
+double position_stddev_px(const Imager& camera, const PoseFit& fit, const BodyCorrespondences& corners) {
   Eigen::Vector3d p_middle = Eigen::Vector3d::Zero();
-  for (const tracker::MarkerCorrespondences& marker : seen)
+  for (const tracker::MarkerCorrespondences& marker : corners)
     p_middle += marker.marker->body_from_marker.translation;
-  p_middle /= static_cast<double>(seen.size());
+  p_middle /= static_cast<double>(corners.size());
   const tracker::PointObservation observation{&camera.lens, Pose(), p_middle, Eigen::Vector2d::Zero()};
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 6> d_r;
@@ -87,7 +89,7 @@ double unsure_px(const Imager& camera, const PoseFit& fit, const BodyCorresponde
   return std::sqrt((d_r * fit.covariance * d_r.transpose()).trace());
 }
 
-// How far apart two lenses of one size show things at most, px of an image `width` wide.
+// The largest distance between the projections of two lenses, px of an image of this width.
 double difference_px(const calib::IntrinsicsEstimate& a, const calib::IntrinsicsEstimate& b, int width) {
   constexpr int k_nodes = 7;
   const Lens lens_a = a.lens(), lens_b = b.lens();
@@ -102,7 +104,7 @@ double difference_px(const calib::IntrinsicsEstimate& a, const calib::Intrinsics
   return most * width / a.width;
 }
 
-// The single markers that stand elsewhere than was said, by the guest's own image.
+// New tracks of single markers that this image shows elsewhere than `tracks` says.
 std::vector<Track> moved_markers(const Imager& view,
                                  double gate_px,
                                  std::span<const tracker::Detection> detections,
@@ -115,14 +117,14 @@ std::vector<Track> moved_markers(const Imager& view,
   for (const Track& track : tracks) {
     const Body* body = find_named(bodies, track.body);
     if (!body || body->markers.size() != 1 || track.tracking == TrackingState::lost) continue;
-    const BodyCorrespondences seen = tracker::correspondences(*body, std::span(&here, 1));
-    const Pose said = view.imager_from_world * track.world_from_body;
-    if (seen.empty() || misfit(seen[0], said) <= gate_px) continue;
-    // The branch that leans as the marker did.
+    const BodyCorrespondences corners = tracker::correspondences(*body, std::span(&here, 1));
+    const Pose expected = view.imager_from_world * track.world_from_body;
+    if (corners.empty() || misfit(corners[0], expected) <= gate_px) continue;
+    // Of two ambiguous poses the one whose rotation is nearer to the old track.
     std::optional<PoseFit> best;
-    for (const PoseFit& fit : tracker::minima(seen))
-      if (!best || angle_between(fit.world_from_body.rotation, said.rotation) <
-                       angle_between(best->world_from_body.rotation, said.rotation))
+    for (const PoseFit& fit : tracker::minima(corners))
+      if (!best || angle_between(fit.world_from_body.rotation, expected.rotation) <
+                       angle_between(best->world_from_body.rotation, expected.rotation))
         best = fit;
     if (!best) continue;
     const Pose world_from_camera = view.imager_from_world.inverse();
@@ -155,7 +157,7 @@ TabletLocalizer::Aspect& TabletLocalizer::aspect_of(int width, int height) {
     std::rotate(found, found + 1, aspects_.end());
     return aspects_.back();
   }
-  if (aspects_.size() >= k_most_aspects) aspects_.erase(aspects_.begin());
+  if (aspects_.size() >= k_max_aspects) aspects_.erase(aspects_.begin());
   const double scale = static_cast<double>(k_lens_side) / std::max(width, height);
   const calib::IntrinsicsEstimate lens =
       calib::prior_intrinsics(std::max(1, static_cast<int>(std::lround(scale * width))),
@@ -164,12 +166,12 @@ TabletLocalizer::Aspect& TabletLocalizer::aspect_of(int width, int height) {
   return aspects_.back();
 }
 
-// What the image shows of each body with several markers, for learning of the lens: of bodies alone, so
-// that it matters little where the session takes them to be.
-void TabletLocalizer::note_views(const Imager& camera,
-                                 std::span<const tracker::Detection> detections,
-                                 std::span<const Body> bodies,
-                                 std::span<const Track> tracks) {
+// Keeps the corners of each body with several markers for update_intrinsics(). Each body has a pose of its
+// own there, so that errors of the session's tracks matter little.
+void TabletLocalizer::collect_views(const Imager& camera,
+                                    std::span<const tracker::Detection> detections,
+                                    std::span<const Body> bodies,
+                                    std::span<const Track> tracks) {
   Imager here = camera;
   here.imager_from_world = Pose();
   const tracker::View view{&here, detections};
@@ -179,11 +181,11 @@ void TabletLocalizer::note_views(const Imager& camera,
   for (const Body& body : bodies)
     for (const Track& track : tracks) {
       if (body.markers.size() < 2 || track.body != body.name) continue;
-      const BodyCorrespondences seen = tracker::correspondences(body, std::span(&view, 1));
-      if (seen.size() < 2) continue;
+      const BodyCorrespondences corners = tracker::correspondences(body, std::span(&view, 1));
+      if (corners.size() < 2) continue;
       calib::BodyView noted{camera.imager_from_world * track.world_from_body, {}};
       for (const tracker::PointObservation& observation :
-           tracker::corners_at(seen, noted.camera_from_body).observations)
+           tracker::corners_at(corners, noted.camera_from_body).observations)
         noted.points.push_back(
             {observation.p_body, (scale.array() * (observation.px.array() + 0.5) - 0.5).matrix(),
              scale.asDiagonal() * Eigen::Matrix2d(observation.information.inverse()) * scale.asDiagonal()});
@@ -191,9 +193,9 @@ void TabletLocalizer::note_views(const Imager& camera,
     }
 }
 
-TabletPose TabletLocalizer::look(const cv::Mat& bgr,
-                                 std::span<const Body> bodies,
-                                 std::span<const Track> tracks) {
+TabletPose TabletLocalizer::localize(const cv::Mat& bgr,
+                                     std::span<const Body> bodies,
+                                     std::span<const Track> tracks) {
   cv::Mat grey;
   cv::cvtColor(bgr, grey, cv::COLOR_BGR2GRAY);
   views_.clear();
@@ -211,55 +213,56 @@ TabletPose TabletLocalizer::look(const cv::Mat& bgr,
   TabletPose out;
   out.focal_stddev_px = focal_stddev_px;
   out.lens_frames = aspect.lens.estimate().views;
-  const auto nothing = [&](const char* why) {
+  const auto without_pose = [&](const char* why) {
     out.why = why;
     return out;
   };
-  if (detections.empty()) return nothing("No markers in view: point the camera at the prototype.");
+  if (detections.empty()) return without_pose("No markers in view: point the camera at the prototype.");
   const tracker::View view{&camera, detections};
-  // Bodies of several markers stand more firmly than those of one.
-  Body room = room_of(bodies, tracks, 2);
-  BodyCorrespondences seen = tracker::correspondences(room, std::span(&view, 1));
-  if (seen.size() < 2) {
-    room = room_of(bodies, tracks, 1);
-    seen = tracker::correspondences(room, std::span(&view, 1));
+  // Bodies with several markers have better poses than those with one.
+  Body room = known_markers(bodies, tracks, 2);
+  BodyCorrespondences corners = tracker::correspondences(room, std::span(&view, 1));
+  if (corners.size() < 2) {
+    room = known_markers(bodies, tracks, 1);
+    corners = tracker::correspondences(room, std::span(&view, 1));
   }
-  if (seen.empty())
-    return nothing("The markers in view have no known place: the room's camera must see them, too.");
+  if (corners.empty())
+    return without_pose("The markers in view have no known place: the room's camera must see them, too.");
   std::vector<PoseFit> fits;
-  if (const auto near = fitted_near(seen, last_)) fits = {*near};
-  last_.reset();
-  if (fits.empty()) fits = tracker::minima(seen);
+  if (const auto near = fitted_near(corners, last_pose_)) fits = {*near};
+  last_pose_.reset();
+  if (fits.empty()) fits = tracker::minima(corners);
   constexpr const char* k_go_nearer = "The markers in view are too small or too steep: go nearer.";
-  if (fits.empty()) return nothing(k_go_nearer);
+  if (fits.empty()) return without_pose(k_go_nearer);
   PoseFit fit = fits.front();
-  const BodyCorrespondences kept = without_moved(seen, fit.world_from_body);
-  if (kept.size() < seen.size() && !kept.empty())
+  const BodyCorrespondences kept = without_moved(corners, fit.world_from_body);
+  if (kept.size() < corners.size() && !kept.empty())
     if (const auto again = tracker::fit_pose(tracker::corners_at(kept, fit.world_from_body).observations,
                                              fit.world_from_body, tracker::k_huber))
       fit = *again;
-  if (kept.size() < 2 && fits.size() > 1 && fits[1].chi_square - fits[0].chi_square < k_sure)
-    return nothing("One marker alone does not tell the place for sure: bring a second one into view.");
-  if (!(unsure_px(camera, fit, kept.empty() ? seen : kept) < k_most_unsure_px)) return nothing(k_go_nearer);
+  if (kept.size() < 2 && fits.size() > 1 && fits[1].chi_square - fits[0].chi_square < k_min_chi_square_gap)
+    return without_pose("One marker alone does not tell the place for sure: bring a second one into view.");
+  if (!(position_stddev_px(camera, fit, kept.empty() ? corners : kept) < k_max_stddev_px))
+    return without_pose(k_go_nearer);
   out.markers = static_cast<int>(kept.size());
   out.rms_px = fit.rms_px;
-  const double gate_px = gate_of(seen, fit.world_from_body);
-  camera.imager_from_world = fit.world_from_body;  // what was seen so far had it at the origin
+  const double gate_px = gate_of(corners, fit.world_from_body);
+  camera.imager_from_world = fit.world_from_body;  // `view` and `fit` had the camera at the origin
   out.moved = moved_markers(camera, gate_px, detections, bodies, tracks);
-  note_views(camera, detections, bodies, tracks);
-  last_ = camera.imager_from_world;
+  collect_views(camera, detections, bodies, tracks);
+  last_pose_ = camera.imager_from_world;
   out.view = std::move(camera);
   return out;
 }
 
-void TabletLocalizer::learn() {
+void TabletLocalizer::update_intrinsics() {
   if (aspects_.empty()) return;
   Aspect& aspect = aspects_.back();
-  bool is_news = false;
-  for (const calib::BodyView& view : views_) is_news |= aspect.lens.add(view);
+  bool has_new_views = false;
+  for (const calib::BodyView& view : views_) has_new_views |= aspect.lens.add(view);
   views_.clear();
-  if (is_news) aspect.lens.improve();
-  if (is_news && difference_px(aspect.lens.estimate(), aspect.used, width_) > k_noticed_px)
+  if (has_new_views) aspect.lens.improve();
+  if (has_new_views && difference_px(aspect.lens.estimate(), aspect.used, width_) > k_noticeable_px)
     aspect.used = aspect.lens.estimate();
 }
 
@@ -270,16 +273,16 @@ std::vector<calib::IntrinsicsEstimate> TabletLocalizer::lenses() const {
   return out;
 }
 
-bool TabletLocalizer::has_learnt() const {
+bool TabletLocalizer::has_better_lenses() const {
   return std::any_of(aspects_.begin(), aspects_.end(), [](const Aspect& aspect) {
     const double now = aspect.lens.estimate().focal_stddev_px();
     return aspect.lens.estimate().views > 0 &&
-           (now < k_learnt * aspect.kept_stddev_px || now > aspect.kept_stddev_px / k_learnt);
+           (now < k_better_share * aspect.saved_stddev_px || now > aspect.saved_stddev_px / k_better_share);
   });
 }
 
-void TabletLocalizer::note_kept() {
-  for (Aspect& aspect : aspects_) aspect.kept_stddev_px = aspect.lens.estimate().focal_stddev_px();
+void TabletLocalizer::mark_lenses_saved() {
+  for (Aspect& aspect : aspects_) aspect.saved_stddev_px = aspect.lens.estimate().focal_stddev_px();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

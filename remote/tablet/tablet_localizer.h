@@ -13,62 +13,61 @@
 #include "tracker/body_correspondences.h"
 #include "tracker/detector.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
-/// Where a guest's camera was when it took an image.
+/// The pose of a tablet's camera at the moment of an image.
 struct TabletPose {
-  /// The camera with its lens as far as it is known, and its place; none: `why` says what to do.
+  /// The camera with its estimated lens and its pose; nullopt: none was found, and `why` says what to do.
   std::optional<Imager> view;
   std::string why;
-  int markers = 0;    ///< that the place rests on
-  double rms_px = 0;  ///< of their corners, each
-  /// Bodies of a single marker that the guest sees elsewhere than `tracks` says, for they are being moved:
-  /// where they are by the guest's own image.
+  int markers = 0;    ///< How many markers the pose was fitted to.
+  double rms_px = 0;  ///< The residual of their corners.
+  /// New tracks of bodies of a single marker that the tablet sees elsewhere than `tracks` says, since
+  /// somebody is moving them.
   std::vector<Track> moved;
-  /// Of the lens: one standard deviation of its focal length, and the images that it was found in.
-  double focal_stddev_px = 0;
-  int lens_frames = 0;
+  double focal_stddev_px = 0;  ///< Standard deviation of the lens's focal length.
+  int lens_frames = 0;         ///< How many images the lens was estimated from.
 };
 
-/// Finds a guest's camera by the markers in its images, and its lens while it looks round. One a device.
-/// Pure: the same images give the same answers. What is drawn by `view` fits the image that it was found
-/// in, and no other: nothing is smoothed.
+/// Finds the pose of one tablet's camera from the markers in its images, and estimates its lens over many
+/// images. The same images give the same answers. Nothing is smoothed: `view` fits its own image only.
 class TabletLocalizer {
  public:
-  /// `lenses` are what is known of the device's from before, one for each aspect ratio of its images.
+  /// `lenses` are earlier estimates for the same device, one for each aspect ratio of its images.
   explicit TabletLocalizer(tracker::Families families,
                            std::span<const calib::IntrinsicsEstimate> lenses = {});
 
-  /// `bgr` is a whole image, sRGB, of any size. `bodies` are what markers stand on, `tracks` where those
-  /// are; a body without a track, or with a lost one, is not to be gone by.
-  TabletPose look(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks);
+  /// Finds the camera's pose. `bgr` is a whole image, sRGB, of any size. `bodies` carry the markers, `tracks`
+  /// are their poses in the world; a body without a track, or with a lost one, is not used.
+  TabletPose localize(const cv::Mat& bgr, std::span<const Body> bodies, std::span<const Track> tracks);
 
-  /// Learns of the lens what the last image tells: a millisecond or two that need not be waited for.
-  void learn();
+  /// Improves the lens by the last image. It takes 1 to 2 ms, which the answer need not wait for.
+  void update_intrinsics();
 
-  /// What is known of the lenses. `has_learnt`: noticeably more than when they were last asked for.
+  /// The estimates of the lenses, one for each aspect ratio.
   std::vector<calib::IntrinsicsEstimate> lenses() const;
-  bool has_learnt() const;
-  void note_kept();
+  /// Whether an estimate has become noticeably better since mark_lenses_saved().
+  bool has_better_lenses() const;
+  void mark_lenses_saved();
 
  private:
-  // Images of one aspect ratio, in pixels of its lens's own size.
+  // The lens of images of one aspect ratio, in pixels of the lens's own size.
   struct Aspect {
     calib::OnlineIntrinsics lens;
-    calib::IntrinsicsEstimate used;  // for drawing: it stays until the found one differs noticeably
-    double kept_stddev_px = 0;
+    calib::IntrinsicsEstimate used;  // for drawing; it is replaced when `lens` differs noticeably
+    double saved_stddev_px = 0;
   };
   Aspect& aspect_of(int width, int height);
-  void note_views(const Imager& camera,
-                  std::span<const tracker::Detection> detections,
-                  std::span<const Body> bodies,
-                  std::span<const Track> tracks);
+  void collect_views(const Imager& camera,
+                     std::span<const tracker::Detection> detections,
+                     std::span<const Body> bodies,
+                     std::span<const Track> tracks);
 
   tracker::Detector detector_;
-  std::vector<Aspect> aspects_;         // the newest last
-  int width_ = 0;                       // of the last image
-  std::optional<Pose> last_;            // camera_from_world, if the last image gave one
-  std::vector<calib::BodyView> views_;  // of the last image, to learn from
+  std::vector<Aspect> aspects_;         // in the order of their last use
+  int width_ = 0;                       // width of the last image, px
+  std::optional<Pose> last_pose_;       // camera_from_world of the last image, if it was found
+  std::vector<calib::BodyView> views_;  // bodies in the last image, for update_intrinsics()
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

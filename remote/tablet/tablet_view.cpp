@@ -32,54 +32,53 @@
 #include "session/stillness.h"
 #include "tracker/family.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
-
-using Answer = std::function<void(TabletView::Seen)>;
 
 constexpr int k_quality = 80;  // of JPEG
 constexpr projector::Smoothing k_smoothing{.samples = 4, .least_step = 0.25};
-constexpr int k_niceness = 19;              // least: sessions and servers go before
-constexpr std::size_t k_most_eyes = 8;      // devices that are known at a time
-constexpr std::size_t k_most_waiting = 16;  // images that are not looked at yet
-// How parts are drawn is decided so often, on images of a fourth of the size.
-constexpr double k_decide_every_s = 0.5;
-constexpr int k_coarser = 4;
+constexpr int k_niceness = 19;                      // the lowest priority: sessions and servers go first
+constexpr std::size_t k_max_devices_in_memory = 8;  // the device that was not used longest is dropped
+constexpr std::size_t k_max_waiting_frames = 16;
+// How parts are composited is decided at this interval, on images of a fourth of the size.
+constexpr double k_policy_interval_s = 0.5;
+constexpr int k_policy_image_divisor = 4;
 
-// What a session said last.
-struct Known {
+// The session's state that images are drawn from.
+struct SessionSnapshot {
   std::shared_ptr<const scene::Scene> scene;
   std::shared_ptr<const Rig> rig;
   int scenes = 0;
   scene::ShowState show_state;
   std::vector<Track> tracks;  // at the moment of `room`
-  ComposeOptions paint;
+  apps::ComposeOptions paint;
   Frame room;
-  std::string follows;  // the guest whom light shows `view` parts to
+  std::string follows;  // the guest whose viewpoint `view` parts are projected for
 };
 
-struct Guest {
-  TabletView::Window window;
+// A tablet's image that waits to be drawn into.
+struct WaitingFrame {
+  TabletWindow window;
   std::vector<std::uint8_t> jpeg;
-  Answer answer;
+  ImageCallback answer;
 };
 
-// What the bodies of a scene are as people paired markers with its slots.
+// The bodies of a scene, with the markers that people have paired with its slots.
 std::vector<Body> bodies_of(const scene::Scene& scene, const scene::ShowState& show_state) {
   std::vector<Body> out;
   if (scene.prototype) out.push_back({"prototype", scene.prototype->markers});
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     const MarkerName& carrier = scene::slot_marker(scene, show_state, i);
-    const double size_m = carrier == slot.marker ? slot.size_m : loose_size_m(scene);
+    const double size_m = carrier == slot.marker ? slot.size_m : apps::loose_size_m(scene);
     out.push_back({slot.name, {{carrier, size_m, Pose()}}});
   }
   return out;
 }
 
-// What carries what, as of the room's newest image.
-std::vector<Track> tracks_of(const Known& known) {
-  return scene::assign_tracks(*known.scene, known.show_state, known.tracks);
+// The tracks of the scene's bodies at the moment of the room's newest image.
+std::vector<Track> tracks_of(const SessionSnapshot& snapshot) {
+  return scene::assign_tracks(*snapshot.scene, snapshot.show_state, snapshot.tracks);
 }
 
 bool is_in_image(const Imager& view, const scene::Scene& scene, const scene::PosedScene& posed) {
@@ -88,80 +87,80 @@ bool is_in_image(const Imager& view, const scene::Scene& scene, const scene::Pos
   return px && view.contains(*px);
 }
 
-TabletView::Seen nothing(const std::string& why) {
+CompositeImage no_image(const std::string& why) {
   return {nlohmann::json{{"sees", "nothing"}, {"why", why}, {"markers", 0}}.dump(), {}};
 }
 
 }  // namespace
 
 struct TabletView::Impl {
-  // Between threads.
+  // Shared by all threads.
   std::mutex mutex;
   std::condition_variable changed;
   bool is_ending = false;
-  std::deque<Guest> guests;  // one a device, in the order of their asking
-  std::vector<Answer> overtaken, rooms;
-  std::shared_ptr<const Known> known;
+  std::deque<WaitingFrame> frames;  // one for each device, in the order of their requests
+  std::vector<ImageCallback> overtaken, room_callbacks;
+  std::shared_ptr<const SessionSnapshot> newest_snapshot;
 
-  // The session's thread's.
-  std::shared_ptr<const scene::Scene> told_scene;
-  std::shared_ptr<const Rig> told_rig;
-  int told_scenes = 0;
+  // Used by the session's thread alone.
+  std::shared_ptr<const scene::Scene> session_scene;
+  std::shared_ptr<const Rig> session_rig;
+  int session_scenes = 0;
 
-  // The onlooker's own.
+  // Used by the view's own thread alone.
   Rig rig;
   std::filesystem::path lens_folder;
   tracker::Families families;
   std::optional<device::GlContext> context;
   std::optional<projector::Renderer> renderer;
-  int drawn_scenes = 0;  // which scene the renderer holds
-  // How parts are drawn into the images of one camera.
-  struct Shown {
-    bool is_viewer = false;  // light shows `view` parts to this camera's eye
+  int drawn_scenes = 0;  // the number of the scene that the renderer holds
+  // How parts are composited into the images of one camera.
+  struct DrawState {
+    bool is_viewer = false;  // `view` parts are projected for this camera's viewpoint
     std::vector<projector::CompositePolicy> policies = {};
-    std::set<std::string> by_light_alone = {};  // slots of which nothing is left to draw
+    std::set<std::string> fully_projected = {};  // slots of which nothing is left to draw: light shows all
     Stamp decided_at = {};
   };
-  // Left of the session's split another look is shown.
-  struct Sides {
-    Shown right, left;
+  // The two sides of the session's split; another look is shown on the left.
+  struct SplitDrawState {
+    DrawState right, left;
   };
-  struct Watching {
-    std::string device;
-    TabletLocalizer eye;
-    Sides shown;
+  struct Device {
+    std::string name;
+    TabletLocalizer localizer;
+    SplitDrawState draw_state;
     TabletViewMode parts = TabletViewMode::as_screen;  // of the last image
   };
-  std::deque<Watching> watching;                         // the one that asked last at the end
-  Sides room{{.is_viewer = true}, {.is_viewer = true}};  // as the room's screen
-  Eigen::AlignedBox3d prototype_box;                     // its own frame
-  std::optional<Pose> held;  // world_from_prototype that is drawn by (stillness.h)
+  std::deque<Device> devices;                                     // in the order of their last use
+  SplitDrawState room{{.is_viewer = true}, {.is_viewer = true}};  // as the room's screen
+  Eigen::AlignedBox3d prototype_box;                              // in the prototype's frame
+  std::optional<Pose> still_world_from_prototype;                 // without jitter (stillness.h)
 
   std::thread thread;
 
   Status open(const scene::Scene& scene);
   void run();
   bool step();
-  void learn();
-  void keep(Watching* device);
-  Seen seen_by(const Guest& guest, const Known& known);
-  Seen seen_in_room(const Known& known);
-  Watching& watching_of(const std::string& device);
-  Status follow_scene(const Known& known);
-  void measure(const scene::Scene& scene);
-  cv::Mat with_parts(const Imager& camera,
-                     const cv::Mat& image,
-                     const scene::PosedScene& posed,
-                     const Known& known,
-                     TabletViewMode parts,
-                     Shown* shown);
-  cv::Mat drawn(const Imager& camera,
-                const cv::Mat& image,
-                const scene::PosedScene& posed,
-                std::span<const Track> tracks,
-                const Known& known,
-                TabletViewMode parts,
-                Sides* shown);
+  void update_intrinsics();
+  void save_lenses_of(Device* device);
+  CompositeImage frame_with_parts(const WaitingFrame& frame, const SessionSnapshot& snapshot);
+  CompositeImage room_with_parts(const SessionSnapshot& snapshot);
+  Device& device_state(const std::string& device);
+  Status update_renderer(const SessionSnapshot& snapshot);
+  void update_prototype_box(const scene::Scene& scene);
+  cv::Mat composite_of(const Imager& camera,
+                       const cv::Mat& image,
+                       const scene::PosedScene& posed,
+                       const SessionSnapshot& snapshot,
+                       TabletViewMode parts,
+                       DrawState* draw_state);
+  cv::Mat split_composite(const Imager& camera,
+                          const cv::Mat& image,
+                          const scene::PosedScene& posed,
+                          std::span<const Track> tracks,
+                          const SessionSnapshot& snapshot,
+                          TabletViewMode parts,
+                          SplitDrawState* draw_state);
 };
 
 Status TabletView::Impl::open(const scene::Scene& scene) {
@@ -169,11 +168,11 @@ Status TabletView::Impl::open(const scene::Scene& scene) {
   LIMN_TRY(context, device::GlContext::create(true));
   LIMN_TRY(renderer, projector::Renderer::create(scene, rig));
   renderer->set_smoothing(k_smoothing);
-  measure(scene);
+  update_prototype_box(scene);
   return {};
 }
 
-void TabletView::Impl::measure(const scene::Scene& scene) {
+void TabletView::Impl::update_prototype_box(const scene::Scene& scene) {
   prototype_box.setEmpty();
   if (scene.prototype)
     for (const Eigen::Vector3f& p : scene.prototype->mesh.positions) prototype_box.extend(p.cast<double>());
@@ -182,193 +181,201 @@ void TabletView::Impl::measure(const scene::Scene& scene) {
 void TabletView::Impl::run() {
   while (step()) {
   }
-  for (Watching& device : watching) keep(&device);
+  for (Device& device : devices) save_lenses_of(&device);
   renderer.reset();
   context.reset();
 }
 
-// Waits for something to do, and does it. False: it is over.
+// Waits for a request and answers it. False: the view is being destroyed.
 bool TabletView::Impl::step() {
-  std::optional<Guest> guest;
-  std::vector<Answer> late, asking;
-  std::shared_ptr<const Known> now;
+  std::optional<WaitingFrame> frame;
+  std::vector<ImageCallback> unanswered, waiting_for_room;
+  std::shared_ptr<const SessionSnapshot> now;
   bool is_over = false;
   {
     std::unique_lock lock(mutex);
-    changed.wait(lock, [&] { return is_ending || !guests.empty() || !overtaken.empty() || !rooms.empty(); });
+    changed.wait(
+        lock, [&] { return is_ending || !frames.empty() || !overtaken.empty() || !room_callbacks.empty(); });
     is_over = is_ending;
-    late.swap(overtaken);
-    asking.swap(rooms);
-    now = known;
+    unanswered.swap(overtaken);
+    waiting_for_room.swap(room_callbacks);
+    now = newest_snapshot;
     if (is_over) {
-      for (Guest& waiting : guests) late.push_back(std::move(waiting.answer));
-      late.insert(late.end(), asking.begin(), asking.end());
-      guests.clear();
-      asking.clear();
-    } else if (!guests.empty()) {
-      guest = std::move(guests.front());
-      guests.pop_front();
+      for (WaitingFrame& waiting : frames) unanswered.push_back(std::move(waiting.answer));
+      unanswered.insert(unanswered.end(), waiting_for_room.begin(), waiting_for_room.end());
+      frames.clear();
+      waiting_for_room.clear();
+    } else if (!frames.empty()) {
+      frame = std::move(frames.front());
+      frames.pop_front();
     }
   }
-  const auto drawn = [&](const auto& draw) -> Seen {
-    if (!now) return nothing("The session has not begun yet.");
+  const auto draw_safely = [&](const auto& draw) -> CompositeImage {
+    if (!now) return no_image("The session has not begun yet.");
     try {
-      if (const Status ready = follow_scene(*now); !ready) return nothing(ready.message());
+      if (const Status ready = update_renderer(*now); !ready) return no_image(ready.message());
       return draw();
     } catch (const std::exception& bug) {
       log_warning("live: the window: this is a bug in Limn, please report it: {}", bug.what());
-      return nothing("This picture could not be drawn into.");
+      return no_image("This picture could not be drawn into.");
     }
   };
-  for (const Answer& answer : late)
-    answer(nothing(is_over ? "The session is over." : "A newer picture came before this one's turn."));
-  if (guest) {
-    guest->answer(drawn([&] { return seen_by(*guest, *now); }));
-    learn();
+  for (const ImageCallback& answer : unanswered)
+    answer(no_image(is_over ? "The session is over." : "A newer picture came before this one's turn."));
+  if (frame) {
+    frame->answer(draw_safely([&] { return frame_with_parts(*frame, *now); }));
+    update_intrinsics();
   }
-  if (!asking.empty()) {
-    const Seen room = drawn([&] { return seen_in_room(*now); });
-    for (const Answer& answer : asking) answer(room);
+  if (!waiting_for_room.empty()) {
+    const CompositeImage room = draw_safely([&] { return room_with_parts(*now); });
+    for (const ImageCallback& answer : waiting_for_room) answer(room);
   }
   return !is_over;
 }
 
-// What the last image tells of its lens, while its guest is not waiting.
-void TabletView::Impl::learn() {
-  if (watching.empty()) return;
-  watching.back().eye.learn();
-  if (watching.back().eye.has_learnt()) keep(&watching.back());
+// Updates the lens from the last image. Its guest has the answer already and does not wait.
+void TabletView::Impl::update_intrinsics() {
+  if (devices.empty()) return;
+  devices.back().localizer.update_intrinsics();
+  if (devices.back().localizer.has_better_lenses()) save_lenses_of(&devices.back());
 }
 
-void TabletView::Impl::keep(Watching* device) {
-  const std::vector<calib::IntrinsicsEstimate> lenses = device->eye.lenses();
+void TabletView::Impl::save_lenses_of(Device* device) {
+  const std::vector<calib::IntrinsicsEstimate> lenses = device->localizer.lenses();
   if (lenses.empty()) return;
-  device->eye.note_kept();
-  if (const Status kept = save_lenses(lens_folder, device->device, lenses); !kept)
-    log_warning("live: {} What was found of a guest's lens is not kept.", kept.message());
+  device->localizer.mark_lenses_saved();
+  if (const Status saved = save_lenses(lens_folder, device->name, lenses); !saved)
+    log_warning("live: {} The estimate of a guest's lens is not saved.", saved.message());
 }
 
-// A scene that was edited, or a rig that was mended, is drawn from now on.
-Status TabletView::Impl::follow_scene(const Known& known) {
-  if (drawn_scenes == known.scenes && renderer && !context->is_lost()) return {};
+// Replaces the renderer when the scene or the rig has changed, or when the GL context is lost.
+Status TabletView::Impl::update_renderer(const SessionSnapshot& snapshot) {
+  if (drawn_scenes == snapshot.scenes && renderer && !context->is_lost()) return {};
   renderer.reset();
   if (context->is_lost()) {
     context.reset();
     LIMN_TRY(context, device::GlContext::create(true));
   }
-  rig = *known.rig;
-  LIMN_TRY(renderer, projector::Renderer::create(*known.scene, rig));
+  rig = *snapshot.rig;
+  LIMN_TRY(renderer, projector::Renderer::create(*snapshot.scene, rig));
   renderer->set_smoothing(k_smoothing);
-  measure(*known.scene);
-  drawn_scenes = known.scenes;
+  update_prototype_box(*snapshot.scene);
+  drawn_scenes = snapshot.scenes;
   return {};
 }
 
-TabletView::Impl::Watching& TabletView::Impl::watching_of(const std::string& device) {
+TabletView::Impl::Device& TabletView::Impl::device_state(const std::string& device) {
   const auto found =
-      std::find_if(watching.begin(), watching.end(), [&](const Watching& w) { return w.device == device; });
-  if (found != watching.end()) {
-    std::rotate(found, found + 1, watching.end());
-    return watching.back();
+      std::find_if(devices.begin(), devices.end(), [&](const Device& each) { return each.name == device; });
+  if (found != devices.end()) {
+    std::rotate(found, found + 1, devices.end());
+    return devices.back();
   }
-  if (watching.size() >= k_most_eyes) {
-    keep(&watching.front());
-    watching.pop_front();
+  if (devices.size() >= k_max_devices_in_memory) {
+    save_lenses_of(&devices.front());
+    devices.pop_front();
   }
-  watching.push_back({device, TabletLocalizer(families, load_lenses(lens_folder, device)), {}});
-  return watching.back();
+  devices.push_back({device, TabletLocalizer(families, load_lenses(lens_folder, device)), {}});
+  return devices.back();
 }
 
-// Parts over an image with another look left of the split, if there is one.
-cv::Mat TabletView::Impl::drawn(const Imager& camera,
-                                const cv::Mat& image,
-                                const scene::PosedScene& posed,
-                                std::span<const Track> tracks,
-                                const Known& known,
-                                TabletViewMode parts,
-                                Sides* shown) {
-  const cv::Mat right = with_parts(camera, image, posed, known, parts, &shown->right);
-  const auto left = scene::left_of_split(*known.scene, known.show_state);
-  const auto line =
-      left ? split_line(camera, posed, prototype_box, known.show_state.split_mm) : std::optional<cv::Vec3d>();
+// An image with parts; left of the session's split, if there is one, the parts of the other look.
+cv::Mat TabletView::Impl::split_composite(const Imager& camera,
+                                          const cv::Mat& image,
+                                          const scene::PosedScene& posed,
+                                          std::span<const Track> tracks,
+                                          const SessionSnapshot& snapshot,
+                                          TabletViewMode parts,
+                                          SplitDrawState* draw_state) {
+  const cv::Mat right = composite_of(camera, image, posed, snapshot, parts, &draw_state->right);
+  const auto left = scene::left_of_split(*snapshot.scene, snapshot.show_state);
+  const auto line = left ? apps::split_line(camera, posed, prototype_box, snapshot.show_state.split_mm)
+                         : std::optional<cv::Vec3d>();
   if (!line) return right;
-  const scene::PosedScene other = scene::compose_scene(*known.scene, *left, tracks);
-  return split_along(*line, with_parts(camera, image, other, known, parts, &shown->left), right);
+  const scene::PosedScene other = scene::compose_scene(*snapshot.scene, *left, tracks);
+  return apps::split_along(*line, composite_of(camera, image, other, snapshot, parts, &draw_state->left),
+                           right);
 }
 
-// Parts over an image. As the room's screen treats them `view` parts that light shows to another eye than
-// this camera's are drawn whole.
-cv::Mat TabletView::Impl::with_parts(const Imager& camera,
-                                     const cv::Mat& image,
-                                     const scene::PosedScene& posed,
-                                     const Known& known,
-                                     TabletViewMode parts,
-                                     Shown* shown) {
+// An image with parts. As the room's screen shows them, `view` parts are drawn whole if they are projected
+// for another viewpoint than this camera's.
+cv::Mat TabletView::Impl::composite_of(const Imager& camera,
+                                       const cv::Mat& image,
+                                       const scene::PosedScene& posed,
+                                       const SessionSnapshot& snapshot,
+                                       TabletViewMode parts,
+                                       DrawState* draw_state) {
   const bool as_screen = parts == TabletViewMode::as_screen;
-  if (parts == TabletViewMode::full || (as_screen && known.show_state.screen == scene::Screen::full))
+  if (parts == TabletViewMode::full || (as_screen && snapshot.show_state.screen == scene::Screen::full))
     return renderer->composite(camera, image, posed, projector::Composite::full);
   const Stamp at = std::chrono::steady_clock::now();
   const double seconds =
-      shown->decided_at == Stamp{} ? k_decide_every_s : seconds_between(shown->decided_at, at);
-  if (seconds >= k_decide_every_s) {
-    const auto coarse =
-        resized(camera, std::max(1, camera.width / k_coarser), std::max(1, camera.height / k_coarser));
+      draw_state->decided_at == Stamp{} ? k_policy_interval_s : seconds_between(draw_state->decided_at, at);
+  if (seconds >= k_policy_interval_s) {
+    const auto coarse = resized(camera, std::max(1, camera.width / k_policy_image_divisor),
+                                std::max(1, camera.height / k_policy_image_divisor));
     const std::vector<projector::PartCoverage> coverage =
         renderer->coverage(posed, coarse ? *coarse : camera);
-    shown->policies = projector::updated_policies(shown->policies, coverage, seconds);
-    shown->by_light_alone.clear();
-    for (projector::CompositePolicy& treatment : shown->policies) {
-      if (as_screen && !shown->is_viewer && known.scene->find_slot(treatment.slot)->mode == scene::Mode::view)
+    draw_state->policies = projector::updated_policies(draw_state->policies, coverage, seconds);
+    draw_state->fully_projected.clear();
+    for (projector::CompositePolicy& treatment : draw_state->policies) {
+      if (as_screen && !draw_state->is_viewer &&
+          snapshot.scene->find_slot(treatment.slot)->mode == scene::Mode::view)
         treatment = {treatment.slot, projector::Composite::full};
       if (treatment.whole() > 0) continue;
       for (const projector::PartCoverage& part : coverage)
         if (part.slot == treatment.slot && part.viewer_pixels > 0 && part.off_surface_share == 0)
-          shown->by_light_alone.insert(part.slot);
+          draw_state->fully_projected.insert(part.slot);
     }
-    shown->decided_at = at;
+    draw_state->decided_at = at;
   }
   scene::PosedScene rest = posed;
-  std::erase_if(rest.parts,
-                [&](const scene::PosedPart& part) { return shown->by_light_alone.contains(part.slot); });
-  return renderer->composite(camera, image, rest, shown->policies);
+  std::erase_if(rest.parts, [&](const scene::PosedPart& part) {
+    return draw_state->fully_projected.contains(part.slot);
+  });
+  return renderer->composite(camera, image, rest, draw_state->policies);
 }
 
-TabletView::Seen TabletView::Impl::seen_by(const Guest& guest, const Known& known) {
-  if (!is_device_name(guest.window.device))
-    return nothing("Expected a device's name of 8 to 64 letters, digits and -.");
+CompositeImage TabletView::Impl::frame_with_parts(const WaitingFrame& frame,
+                                                  const SessionSnapshot& snapshot) {
+  if (!is_device_name(frame.window.device))
+    return no_image("Expected a device's name of 8 to 64 letters, digits and -.");
   const Stamp begun = std::chrono::steady_clock::now();
-  const auto image = decode_tablet_image(guest.jpeg);
-  if (!image) return nothing(image.message());
+  const auto image = decode_tablet_image(frame.jpeg);
+  if (!image) return no_image(image.message());
   const double decode_ms = milliseconds_since(begun);
 
   const Stamp tracking = std::chrono::steady_clock::now();
-  std::vector<Track> tracks = tracks_of(known);
-  const Pose turned_from_world = steadied(&held, &tracks);
-  Watching& device = watching_of(guest.window.device);
-  const TabletPose observation = device.eye.look(*image, bodies_of(*known.scene, known.show_state), tracks);
+  std::vector<Track> tracks = tracks_of(snapshot);
+  const Pose turned_from_world = apps::steadied(&still_world_from_prototype, &tracks);
+  Device& device = device_state(frame.window.device);
+  const TabletPose observation =
+      device.localizer.localize(*image, bodies_of(*snapshot.scene, snapshot.show_state), tracks);
   const double track_ms = milliseconds_since(tracking);
-  if (!observation.view) return nothing(observation.why);
+  if (!observation.view) return no_image(observation.why);
 
   const Stamp drawing = std::chrono::steady_clock::now();
   for (const Track& moved : observation.moved)
     for (Track& track : tracks)
       if (track.body == moved.body) track = moved;
-  const scene::PosedScene posed = scene::compose_scene(*known.scene, known.show_state, tracks);
-  const bool is_viewer = !guest.window.guest.empty() && guest.window.guest == known.follows;
-  const bool is_as_before = is_viewer == device.shown.right.is_viewer && guest.window.parts == device.parts;
-  if (!is_as_before) device.shown = {{.is_viewer = is_viewer}, {.is_viewer = is_viewer}};
-  device.parts = guest.window.parts;
-  const cv::Mat out = drawn(*observation.view, *image, posed, tracks, known, device.parts, &device.shown);
+  const scene::PosedScene posed = scene::compose_scene(*snapshot.scene, snapshot.show_state, tracks);
+  const bool is_viewer = !frame.window.guest.empty() && frame.window.guest == snapshot.follows;
+  const bool is_as_before =
+      is_viewer == device.draw_state.right.is_viewer && frame.window.parts == device.parts;
+  if (!is_as_before) device.draw_state = {{.is_viewer = is_viewer}, {.is_viewer = is_viewer}};
+  device.parts = frame.window.parts;
+  const cv::Mat out =
+      split_composite(*observation.view, *image, posed, tracks, snapshot, device.parts, &device.draw_state);
   const double composite_ms = milliseconds_since(drawing);
 
   const Stamp encoding = std::chrono::steady_clock::now();
   const Pose view_from_world = observation.view->imager_from_world * turned_from_world;
-  Seen seen{{}, device::encode_jpeg(out, k_quality), view_from_world.inverse().translation};
+  CompositeImage result{{}, device::encode_jpeg(out, k_quality), view_from_world.inverse().translation};
   const double encode_ms = milliseconds_since(encoding);
   const Lens& lens = observation.view->lens;
-  seen.json =
+  result.json =
       nlohmann::json{
-          {"sees", is_in_image(*observation.view, *known.scene, posed) ? "prototype" : "markers"},
+          {"sees", is_in_image(*observation.view, *snapshot.scene, posed) ? "prototype" : "markers"},
           {"why", ""},
           {"markers", observation.markers},
           {"view_from_world", to_json(view_from_world)},
@@ -381,13 +388,15 @@ TabletView::Seen TabletView::Impl::seen_by(const Guest& guest, const Known& know
           {"ms",
            {{"decode", decode_ms}, {"track", track_ms}, {"composite", composite_ms}, {"encode", encode_ms}}}}
           .dump();
-  return seen;
+  return result;
 }
 
-TabletView::Seen TabletView::Impl::seen_in_room(const Known& known) {
-  const auto without = [](const char* why) { return Seen{nlohmann::json{{"why", why}}.dump(), {}}; };
-  if (known.room.image.empty()) return without("The room's camera has shown nothing yet.");
-  cv::Mat image = known.paint.is_linear_camera ? srgb_image(known.room.image) : known.room.image;
+CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot) {
+  const auto without = [](const char* why) {
+    return CompositeImage{nlohmann::json{{"why", why}}.dump(), {}};
+  };
+  if (snapshot.room.image.empty()) return without("The room's camera has shown nothing yet.");
+  cv::Mat image = snapshot.paint.is_linear_camera ? srgb_image(snapshot.room.image) : snapshot.room.image;
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
   Imager camera = rig.cameras[0];
   const double scale = 1.0 * k_drawn_side / std::max(image.cols, image.rows);
@@ -398,24 +407,26 @@ TabletView::Seen TabletView::Impl::seen_in_room(const Known& known) {
     camera = *smaller;
     cv::resize(image, image, size, 0, 0, cv::INTER_AREA);
   }
-  std::vector<Track> tracks = tracks_of(known);
-  camera.imager_from_world = camera.imager_from_world * steadied(&held, &tracks).inverse();
-  const scene::PosedScene posed = scene::compose_scene(*known.scene, known.show_state, tracks);
-  const cv::Mat out = drawn(camera, image, posed, tracks, known, TabletViewMode::as_screen, &room);
+  std::vector<Track> tracks = tracks_of(snapshot);
+  camera.imager_from_world =
+      camera.imager_from_world * apps::steadied(&still_world_from_prototype, &tracks).inverse();
+  const scene::PosedScene posed = scene::compose_scene(*snapshot.scene, snapshot.show_state, tracks);
+  const cv::Mat out =
+      split_composite(camera, image, posed, tracks, snapshot, TabletViewMode::as_screen, &room);
   return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
 }
 
 TabletView::TabletView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<TabletView>> TabletView::create(const SessionSetup& setup,
+Result<std::unique_ptr<TabletView>> TabletView::create(const apps::SessionSetup& setup,
                                                        std::filesystem::path lens_folder) {
   auto impl = std::make_unique<Impl>();
   impl->rig = setup.rig;
   impl->lens_folder = std::move(lens_folder);
   const std::vector<Body> bodies = scene::bodies(setup.scene);
   LIMN_TRY(impl->families, tracker::Families::load(tracker::families_of(bodies), setup.scene.folder));
-  impl->told_scene = std::make_shared<scene::Scene>(setup.scene);
-  impl->told_rig = std::make_shared<Rig>(setup.rig);
+  impl->session_scene = std::make_shared<scene::Scene>(setup.scene);
+  impl->session_rig = std::make_shared<Rig>(setup.rig);
   std::promise<Status> opened;
   std::future<Status> is_open = opened.get_future();
   impl->thread = std::thread([impl = impl.get(), &setup, &opened] {
@@ -439,40 +450,41 @@ TabletView::~TabletView() {
   impl_->thread.join();
 }
 
-void TabletView::know(const Session& session) {
-  if (impl_->told_scenes != session.scenes()) {
-    impl_->told_scene = std::make_shared<scene::Scene>(session.setup().scene);
-    impl_->told_rig = std::make_shared<Rig>(session.setup().rig);
-    impl_->told_scenes = session.scenes();
+void TabletView::update_session(const apps::Session& session) {
+  if (impl_->session_scenes != session.scenes()) {
+    impl_->session_scene = std::make_shared<scene::Scene>(session.setup().scene);
+    impl_->session_rig = std::make_shared<Rig>(session.setup().rig);
+    impl_->session_scenes = session.scenes();
   }
-  const Percepts& watched = session.watched();
-  auto known = std::make_shared<Known>(Known{.scene = impl_->told_scene,
-                                             .rig = impl_->told_rig,
-                                             .scenes = session.scenes(),
-                                             .show_state = session.show_state(),
-                                             .tracks = session.prediction().at_image,
-                                             .paint = session.setup().paint,
-                                             .room = watched.frames.empty() ? Frame{} : watched.frames[0],
-                                             .follows = session.painted().follows});
+  const apps::Percepts& watched = session.watched();
+  auto snapshot = std::make_shared<SessionSnapshot>(
+      SessionSnapshot{.scene = impl_->session_scene,
+                      .rig = impl_->session_rig,
+                      .scenes = session.scenes(),
+                      .show_state = session.show_state(),
+                      .tracks = session.prediction().at_image,
+                      .paint = session.setup().paint,
+                      .room = watched.frames.empty() ? Frame{} : watched.frames[0],
+                      .follows = session.painted().follows});
   const std::lock_guard lock(impl_->mutex);
-  impl_->known = std::move(known);
+  impl_->newest_snapshot = std::move(snapshot);
 }
 
-void TabletView::look(const Window& window,
-                      std::vector<std::uint8_t> jpeg,
-                      std::function<void(Seen)> answer) {
+void TabletView::draw_window(const TabletWindow& window,
+                             std::vector<std::uint8_t> jpeg,
+                             ImageCallback answer) {
   {
     const std::lock_guard lock(impl_->mutex);
-    const auto before = std::find_if(impl_->guests.begin(), impl_->guests.end(), [&](const Guest& guest) {
-      return guest.window.device == window.device;
-    });
-    if (before == impl_->guests.end()) {
-      if (impl_->guests.size() >= k_most_waiting) {
-        impl_->overtaken.push_back(std::move(impl_->guests.front().answer));
-        impl_->guests.pop_front();
+    const auto before =
+        std::find_if(impl_->frames.begin(), impl_->frames.end(),
+                     [&](const WaitingFrame& frame) { return frame.window.device == window.device; });
+    if (before == impl_->frames.end()) {
+      if (impl_->frames.size() >= k_max_waiting_frames) {
+        impl_->overtaken.push_back(std::move(impl_->frames.front().answer));
+        impl_->frames.pop_front();
       }
-      impl_->guests.push_back({window, std::move(jpeg), std::move(answer)});
-    } else {  // keeps its turn
+      impl_->frames.push_back({window, std::move(jpeg), std::move(answer)});
+    } else {  // the new image takes the place of the waiting one
       before->window = window;
       impl_->overtaken.push_back(std::exchange(before->answer, std::move(answer)));
       before->jpeg = std::move(jpeg);
@@ -481,12 +493,12 @@ void TabletView::look(const Window& window,
   impl_->changed.notify_all();
 }
 
-void TabletView::room(std::function<void(Seen)> answer) {
+void TabletView::draw_room(ImageCallback answer) {
   {
     const std::lock_guard lock(impl_->mutex);
-    impl_->rooms.push_back(std::move(answer));
+    impl_->room_callbacks.push_back(std::move(answer));
   }
   impl_->changed.notify_all();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -13,48 +13,50 @@
 #include "session/recording.h"
 #include "session/session.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
-/// The window of docs/remote.md: finds where guests' tablets are in the images that they send, and draws
-/// the parts into those same images. Has a thread and a GL context of its own, both of low priority: a
-/// session does not wait for it. The lens of each device is estimated from the markers while people look
-/// round, and kept.
+/// A camera's image with parts drawn into it, or the reason why there is none.
+struct CompositeImage {
+  std::string json;                ///< The JSON that docs/remote.md describes for the image.
+  std::vector<std::uint8_t> jpeg;  ///< Empty: no image.
+  std::optional<Eigen::Vector3d> p_viewpoint_world = {};  ///< The tablet's camera; nullopt: not known.
+};
+using ImageCallback = std::function<void(CompositeImage)>;
+
+/// Whose image a frame is, and what is drawn into it. The session's split is drawn in any case.
+struct TabletWindow {
+  std::string device;  ///< The device whose lens the image has.
+  std::string guest =
+      {};  ///< The guest's name, if this window can be the viewer (ShowState::viewer); or empty.
+  TabletViewMode parts = TabletViewMode::as_screen;
+};
+
+/// The window of docs/remote.md: finds the camera poses of guests' tablets in the images that they send, and
+/// draws the parts into those same images. It has a thread and a GL context of its own, both of low priority,
+/// so that a session does not wait for it. The lens of each device is estimated from markers over many
+/// images, and saved.
 class TabletView {
  public:
-  /// `lens_folder` keeps what is known of guests' lenses; made when there is something to keep. Errors: no GL
+  /// `lens_folder` keeps the estimates of lenses; it is made when there is something to save. Errors: no GL
   /// context, marker families that cannot be loaded, a scene that cannot be drawn.
-  static Result<std::unique_ptr<TabletView>> create(const SessionSetup& setup,
+  static Result<std::unique_ptr<TabletView>> create(const apps::SessionSetup& setup,
                                                     std::filesystem::path lens_folder);
-  /// Everybody who still waits is answered first, with nothing.
+  /// First answers everybody who still waits, without an image.
   ~TabletView();
 
-  /// What the session knows now: call it at every image, on the session's thread. Cheap; the scene is
-  /// copied when it is another one.
-  void know(const Session& session);
+  /// Copies what is drawn from the session: call it after every frame, on the session's thread. It is cheap;
+  /// the scene is copied only when it has changed.
+  void update_session(const apps::Session& session);
 
-  /// An answer to a guest: the window's JSON of docs/remote.md, and an image, empty where there is none.
-  struct Seen {
-    std::string json;
-    std::vector<std::uint8_t> jpeg;
-    std::optional<Eigen::Vector3d> p_eye_world = {};  ///< where the tablet looks from, if that is known
-  };
+  /// Draws the parts into a guest's image. May be called from any thread and returns at once. Of one device
+  /// only the newest image is drawn; one that it replaces is answered without an image. `answer` is called
+  /// exactly once, on the view's own thread, which waits for its return. Images that are no JPEG, too large
+  /// or damaged are answered without an image, and with the reason.
+  void draw_window(const TabletWindow& window, std::vector<std::uint8_t> jpeg, ImageCallback answer);
 
-  /// Whose image it is, and what is drawn into it; the session's split is kept.
-  struct Window {
-    std::string device;      ///< whose lens it has
-    std::string guest = {};  ///< as ShowState::viewer calls the one that light shows `view` parts to
-    TabletViewMode parts = TabletViewMode::as_screen;
-  };
-
-  /// Draws the parts into a guest's image. From any thread; returns at once. The newest image of a device
-  /// wins: one that it overtakes is answered with nothing. Every call is answered exactly once, on the
-  /// onlooker's thread, which waits for `answer` to return. Images that are no JPEG, too large or damaged
-  /// are answered with nothing and why.
-  void look(const Window& window, std::vector<std::uint8_t> jpeg, std::function<void(Seen)> answer);
-
-  /// Camera 0's newest image with the parts, as the room's screen shows it, at most 1280 pixels a side; its
-  /// JSON is {"why": ""}, or says why there is no image. Otherwise as look().
-  void room(std::function<void(Seen)> answer);
+  /// Draws the parts into camera 0's newest image, as the room's screen shows it, at most 1280 pixels a side.
+  /// The JSON is {"why": ""}, or says why there is no image. Otherwise as draw_window().
+  void draw_room(ImageCallback answer);
 
  private:
   struct Impl;
@@ -62,4 +64,4 @@ class TabletView {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -1,12 +1,12 @@
 #pragma once
 
-namespace limn::apps {
+namespace limn::remote {
 
-/// What a guest's window draws of the parts.
+/// Which parts a guest's window draws.
 enum class TabletViewMode {
-  as_screen,  ///< as the room's screen, but `view` parts whole where light shows them to another eye
-  rest,       ///< what light does not show, whoever it is drawn for
-  full        ///< whole parts
+  as_screen,  ///< As the room's screen, but `view` parts whole if they are projected for another viewpoint.
+  rest,       ///< What light does not show, for any viewpoint.
+  full        ///< Whole parts.
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

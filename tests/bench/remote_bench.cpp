@@ -51,7 +51,7 @@ class Stage {
   Stage() : context_(device::GlContext::create().value()) {
     sim::World world =
         sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
-    static_cast<void>(apps::scale_resolution(k_resolution, &world.rig).ok());
+    static_cast<void>(scale_resolution(k_resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_ = std::make_unique<sim::VirtualRig>(
@@ -66,13 +66,13 @@ class Stage {
   const apps::SessionSetup& setup() const { return setup_; }
 
   // Duration of a frame, ms.
-  double frame(apps::Server* server) {
+  double frame(remote::Server* server) {
     constexpr int k_cameras[] = {0};
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
     if (!frames.empty()) session_->take(perception_->watch(frames), ++moments_);
-    server->hear(&*session_, rig_->now());
-    server->tell(*session_, *telemetry_, health_, rig_->now());
+    server->apply_edits(&*session_, rig_->now());
+    server->publish_state(*session_, *telemetry_, health_, rig_->now());
     session_->paint(rig_->now(), shifted(rig_->now(), k_lag_s));
     const double took_ms = ms_since(begun);
     for (std::size_t i = 0; i < setup_.rig.projectors.size(); ++i)
@@ -95,7 +95,7 @@ class Stage {
 // own work is small and has the lowest priority.
 class AuthSessions {
  public:
-  AuthSessions(const apps::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
+  AuthSessions(const remote::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
     const std::string pin = server.invitation().pins[1];
     for (int i = 0; i < k_guests; ++i) {
       const auto paired =
@@ -114,7 +114,7 @@ class AuthSessions {
 
  private:
   void attend(int number) {
-    apps::step_back(19);
+    step_back(19);
     RemoteClient& socket = *sockets_[static_cast<std::size_t>(number)];
     while (!is_over_) {
       if (number == 0) edit(&socket);
@@ -175,13 +175,13 @@ int run(int argc, char** argv) {
   set_log_level(LogLevel::warning);
   Stage stage;
   const fs::path keys = fs::temp_directory_path() / fmt::format("limn-remote-bench-{}", ::getpid());
-  auto tablet_view = apps::TabletView::create(stage.setup(), keys);
+  auto tablet_view = remote::TabletView::create(stage.setup(), keys);
   if (!tablet_view) {
     fmt::print(stderr, "{}\n", tablet_view.message());
     return 1;
   }
-  const apps::ServeOptions options{.at = "0", .page = {}, .keys = {}};
-  const auto server = apps::Server::open(options, apps::image_providers(std::move(*tablet_view)));
+  const remote::ServeOptions options{.at = "0", .page = {}, .keys = {}};
+  const auto server = remote::Server::open(options, remote::image_providers(std::move(*tablet_view)));
   if (!server) {
     fmt::print(stderr, "{}\n", server.message());
     return 1;

@@ -84,10 +84,10 @@ struct Room {
   }
 };
 
-apps::TabletView::Seen look(apps::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
-  std::promise<apps::TabletView::Seen> answered;
-  tablet_view->look({k_device}, jpeg,
-                    [&](apps::TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+remote::CompositeImage look(remote::TabletView* tablet_view, const std::vector<std::uint8_t>& jpeg) {
+  std::promise<remote::CompositeImage> answered;
+  tablet_view->draw_window({k_device}, jpeg,
+                           [&](remote::CompositeImage seen) { answered.set_value(std::move(seen)); });
   return answered.get_future().get();
 }
 
@@ -126,7 +126,7 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world) {
   return points;
 }
 
-void print_window(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
+void print_window(const std::vector<TabletShot>& shots, Room* room, remote::TabletView* tablet_view) {
   const std::vector<Eigen::Vector3d> points = part_points(room->rig.world());
   tracker::Detector detector(tracker::Families::load(tracker::families_of(scene::bodies(room->setup.scene)),
                                                      room->setup.scene.folder)
@@ -145,7 +145,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
     for (std::size_t i = 0; i < shots.size(); ++i) {
       const TabletShot& shot = shots[i];
       room->session.take(moments[i], room->moments);
-      tablet_view->know(room->session);
+      tablet_view->update_session(room->session);
       const double begun_processor = processor_ms(), begun = now_ms();
       const cv::Mat image = device::decode_jpeg(shot.jpeg).value();
       const double decoded = now_ms();
@@ -157,7 +157,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
       (void)device::encode_jpeg(image, k_quality);
       const double encoded = now_ms();
       const double asked_processor = processor_ms(), asked = now_ms();
-      const apps::TabletView::Seen seen = look(tablet_view, shot.jpeg);
+      const remote::CompositeImage seen = look(tablet_view, shot.jpeg);
       const double answered_processor = processor_ms(), answered = now_ms();
       const json said = json::parse(seen.json);
       LIMN_CHECK(said["sees"] != "nothing");
@@ -196,7 +196,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, apps::Tablet
 
 // Renders images one after the other, with a part nudged in each, with and without a tablet view ten times a
 // second. The two take turns, so that a busy machine slows both.
-void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps::TabletView* tablet_view) {
+void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, remote::TabletView* tablet_view) {
   constexpr int k_turns = 6, k_images = 14;
   std::vector<double> with, without, know;
   for (int turn = 0; turn < 2 * k_turns; ++turn) {
@@ -214,7 +214,7 @@ void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, apps
       const double begun = now_ms();
       room->session.paint(room->rig.now(), shifted(room->rig.now(), 0.04));
       const double painted = now_ms();
-      tablet_view->know(room->session);
+      tablet_view->update_session(room->session);
       know.push_back(now_ms() - painted);
       if (i > 1) (turn % 2 == 1 ? with : without).push_back(now_ms() - begun);
     }
@@ -255,10 +255,10 @@ int main(int argc, char** argv) {
     shots.push_back(tablet.shoot(10.0 * static_cast<double>(i) / static_cast<double>(frames)));
   const fs::path folder = fs::temp_directory_path() / fmt::format("limn-bench-lenses-{}", getpid());
   {
-    const auto tablet_view = apps::TabletView::create(room.setup, folder).value();
+    const auto tablet_view = remote::TabletView::create(room.setup, folder).value();
     fmt::print("{} images of {}x{}, seed {}; {}\n", shots.size(), k_width, k_height, seed,
                room.context.description());
-    tablet_view->know(room.session);
+    tablet_view->update_session(room.session);
     std::thread([&] { print_window(shots, &room, tablet_view.get()); }).join();
     print_projector_loop(shots, &room, tablet_view.get());
   }

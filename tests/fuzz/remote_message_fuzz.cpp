@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "remote/http.h"
-#include "remote/messages.h"
+#include "remote/api/messages.h"
+#include "remote/http/http.h"
 #include "tests/fuzz/fuzz_file.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 // A refusal is sent to the guest as JSON: it must be UTF-8, short, and say what was expected.
@@ -29,32 +29,33 @@ void check_edit(const scene::Edit& edit) {
   check_word(edit.value, k_longest_word);
 }
 
-void check_remark(const Remark& remark) {
-  check_word(remark.look, k_longest_word);
-  check_word(remark.slot, k_longest_word);
-  check_word(remark.text, scene::k_longest_comment);
+void check_comment(const CommentRequest& comment) {
+  check_word(comment.look, k_longest_word);
+  check_word(comment.slot, k_longest_word);
+  check_word(comment.text, scene::k_longest_comment);
 }
 
 void check_message(const Message& message) {
   if (const auto* edit = std::get_if<EditMessage>(&message)) check_edit(edit->edit);
-  if (const auto* remark = std::get_if<RemarkMessage>(&message)) check_remark(remark->remark);
+  if (const auto* comment = std::get_if<CommentMessage>(&message)) check_comment(comment->comment);
   if (const auto* window = std::get_if<WindowMessage>(&message))
     LIMN_CHECK(window->device.find_first_of("./\\ ") == std::string::npos && window->device.size() >= 8);
 }
 
 void check_bodies(const std::string& text) {
-  if (const auto wish = pair_of_body(text); wish)
-    LIMN_CHECK(wish->pin.size() == 6 && wish->name.size() <= k_longest_guest_name && !wish->name.empty());
+  if (const auto pairing = parse_pairing(text); pairing)
+    LIMN_CHECK(pairing->pin.size() == 6 && pairing->name.size() <= k_longest_guest_name &&
+               !pairing->name.empty());
   else
-    check_refusal(wish.message());
-  if (const auto edit = edit_of_body(text); edit)
+    check_refusal(pairing.message());
+  if (const auto edit = parse_edit(text); edit)
     check_edit(*edit);
   else
     check_refusal(edit.message());
-  if (const auto remark = remark_of_body(text); remark)
-    check_remark(*remark);
+  if (const auto comment = parse_comment(text); comment)
+    check_comment(*comment);
   else
-    check_refusal(remark.message());
+    check_refusal(comment.message());
 }
 
 void check_http(const std::string& text) {
@@ -67,20 +68,20 @@ void check_http(const std::string& text) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
-  using namespace limn::apps;
+  using namespace limn::remote;
   const std::string text(reinterpret_cast<const char*>(bytes), size);
-  if (const auto message = message_of(text); message) {
+  if (const auto message = parse_message(text); message) {
     check_message(*message);
   } else {
     check_refusal(message.message());
-    static_cast<void>(id_of(text));
+    static_cast<void>(parse_message_id(text));
   }
   check_bodies(text);
   check_http(text);
-  if (const auto frame = frame_of({bytes, size}); frame)
+  if (const auto frame = parse_frame({bytes, size}); frame)
     LIMN_CHECK(frame->jpeg.size() + 4 == size && frame->jpeg.data() == bytes + 4);
   else
     check_refusal(frame.message());

@@ -34,25 +34,25 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   static const std::vector<Body> known = bodies();
   static const std::vector<Track> where = tracks();
   static const tracker::Families families = tracker::Families::load(tracker::families_of(known)).value();
-  const auto image = apps::decode_tablet_image({bytes, size});
+  const auto image = remote::decode_tablet_image({bytes, size});
   if (!image) {
     LIMN_CHECK(image.message().find("expected") != std::string::npos);
     return 0;
   }
-  LIMN_CHECK(image->type() == CV_8UC3 && std::max(image->cols, image->rows) <= apps::k_drawn_side);
-  apps::TabletLocalizer eye(families);
+  LIMN_CHECK(image->type() == CV_8UC3 && std::max(image->cols, image->rows) <= remote::k_drawn_side);
+  remote::TabletLocalizer localizer(families);
   for (int i = 0; i < 2; ++i) {  // the second time with the learned lens
-    const apps::TabletPose sight = eye.look(*image, known, where);
-    eye.learn();
-    LIMN_CHECK(sight.view.has_value() == sight.why.empty());
-    LIMN_CHECK(std::isfinite(sight.focal_stddev_px) && sight.focal_stddev_px > 0);
-    if (!sight.view) continue;
-    LIMN_CHECK(sight.markers > 0 && std::isfinite(sight.rms_px));
-    LIMN_CHECK(sight.view->imager_from_world.is_finite());
-    LIMN_CHECK(Lens::create(sight.view->lens.model.name(), sight.view->lens.values).ok());
-    for (const Track& moved : sight.moved)
+    const remote::TabletPose found = localizer.localize(*image, known, where);
+    localizer.update_intrinsics();
+    LIMN_CHECK(found.view.has_value() == found.why.empty());
+    LIMN_CHECK(std::isfinite(found.focal_stddev_px) && found.focal_stddev_px > 0);
+    if (!found.view) continue;
+    LIMN_CHECK(found.markers > 0 && std::isfinite(found.rms_px));
+    LIMN_CHECK(found.view->imager_from_world.is_finite());
+    LIMN_CHECK(Lens::create(found.view->lens.model.name(), found.view->lens.values).ok());
+    for (const Track& moved : found.moved)
       LIMN_CHECK(moved.world_from_body.is_finite() && moved.covariance.allFinite());
   }
-  for (const calib::IntrinsicsEstimate& lens : eye.lenses()) LIMN_CHECK(lens.is_sound());
+  for (const calib::IntrinsicsEstimate& lens : localizer.lenses()) LIMN_CHECK(lens.is_sound());
   return 0;
 }

@@ -19,7 +19,7 @@
 #include "tests/remote/remote_client.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::remote {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -43,7 +43,7 @@ inline std::uint32_t number_at(const std::string& bytes, std::size_t at) {
 }
 
 // What a frame is answered with: the frame itself, after a moment, on another thread.
-inline ImageProviders eyes_that_echo(std::chrono::milliseconds after = 0ms, std::size_t jpeg_bytes = 0) {
+inline ImageProviders echoing_providers(std::chrono::milliseconds after = 0ms, std::size_t jpeg_bytes = 0) {
   struct Threads {
     std::vector<std::thread> all;
     std::mutex mutex;
@@ -59,21 +59,21 @@ inline ImageProviders eyes_that_echo(std::chrono::milliseconds after = 0ms, std:
       job();
     });
   };
-  ImageProviders eyes;
-  eyes.look = [later, jpeg_bytes](const TabletView::Window& window, std::vector<std::uint8_t> jpeg,
-                                  ImageProviders::Answer answer) {
+  ImageProviders providers;
+  providers.draw_window = [later, jpeg_bytes](const TabletWindow& window, std::vector<std::uint8_t> jpeg,
+                                              ImageCallback answer) {
     if (jpeg_bytes > 0) jpeg.resize(jpeg_bytes);
     later([device = window.device, jpeg = std::move(jpeg), answer = std::move(answer)] {
       answer({json({{"sees", "nothing"}, {"why", device}}).dump(), jpeg});
     });
   };
   const auto rooms = std::make_shared<std::atomic<std::uint8_t>>(0);
-  eyes.room = [later, rooms](ImageProviders::Answer answer) {
+  providers.draw_room = [later, rooms](ImageCallback answer) {
     later([rooms, answer = std::move(answer)] {
       answer({R"({"why":""})", {0xff, 0xd8, static_cast<std::uint8_t>(++*rooms)}});
     });
   };
-  return eyes;
+  return providers;
 }
 
 /// The remote on the loopback, with a page of its own, and guests.
@@ -86,12 +86,12 @@ class AServer : public testing::Test {
     ASSERT_TRUE(write_file(folder_ / "secret.txt", "secret"));
   }
 
-  void open(ServeOptions options = {}, ImageProviders eyes = {}) {
+  void open(ServeOptions options = {}, ImageProviders providers = {}) {
     if (options.at.empty()) options.at = "0";
     options.page = folder_ / "page";
     options.keys = folder_ / "keys";
     is_encrypted_ = options.always_encrypted;
-    auto server = Server::open(options, std::move(eyes));
+    auto server = Server::open(options, std::move(providers));
     ASSERT_TRUE(server) << server.message();
     server_ = std::move(*server);
   }
@@ -124,4 +124,4 @@ class AServer : public testing::Test {
   std::unique_ptr<Server> server_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -1,5 +1,5 @@
 // The remote's certificate and its authority, judged as a device does that trusts the authority alone.
-#include "remote/certificate.h"
+#include "remote/http/certificate.h"
 
 #include <gtest/gtest.h>
 #include <openssl/pem.h>
@@ -14,7 +14,7 @@
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -45,7 +45,7 @@ int trusting(const Certificate& trusted, const std::string& pem, const std::stri
 
 TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
   const fs::path all = test::test_folder(), folder = all / "limn", file = folder / "remote.pem";
-  const auto first = certificate_in(folder, {"localhost", "192.168.7.2"});
+  const auto first = load_or_create_certificate(folder, {"localhost", "192.168.7.2"});
   ASSERT_TRUE(first) << first.message();
   for (const char* name : {"remote.pem", "authority.pem"}) {
     struct stat found {};
@@ -53,8 +53,9 @@ TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
     EXPECT_EQ(found.st_mode & 07777u, 0600u) << name;
   }
   EXPECT_TRUE(std::regex_match(first->fingerprint, std::regex("([0-9A-F]{2}:){31}[0-9A-F]{2}")));
-  EXPECT_EQ(certificate_in(folder, {"192.168.7.2"})->fingerprint, first->fingerprint) << "known already";
-  const auto other = certificate_in(folder, {"192.168.7.3", "fe80::1"});
+  EXPECT_EQ(load_or_create_certificate(folder, {"192.168.7.2"})->fingerprint, first->fingerprint)
+      << "known already";
+  const auto other = load_or_create_certificate(folder, {"192.168.7.3", "fe80::1"});
   ASSERT_TRUE(other);
   EXPECT_NE(other->fingerprint, first->fingerprint) << "another host";
   EXPECT_EQ(other->authority, first->authority) << "devices that trust it trust the new address, too";
@@ -63,7 +64,7 @@ TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
   EXPECT_EQ(files, 2) << "temporary files stay";
 
   ::chmod(file.c_str(), 0640);
-  const auto readable = certificate_in(folder, {"192.168.7.3"});
+  const auto readable = load_or_create_certificate(folder, {"192.168.7.3"});
   ASSERT_FALSE(readable);
   EXPECT_NE(readable.message().find("found mode 640"), std::string::npos) << readable.message();
   ::chmod(file.c_str(), 0600);
@@ -71,7 +72,7 @@ TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
     const std::string kept = read_file(folder / name).value();
     ASSERT_TRUE(write_file(folder / name, "something else"));
     ::chmod((folder / name).c_str(), 0600);
-    const auto broken = certificate_in(folder, {"192.168.7.3"});
+    const auto broken = load_or_create_certificate(folder, {"192.168.7.3"});
     ASSERT_FALSE(broken) << name;
     EXPECT_NE(broken.message().find(name), std::string::npos) << broken.message();
     EXPECT_NE(broken.message().find("expected a private key"), std::string::npos) << broken.message();
@@ -79,9 +80,9 @@ TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
     ::chmod((folder / name).c_str(), 0600);
   }
   // Another's certificate, or one from before there was an authority.
-  ASSERT_TRUE(certificate_in(all / "another", {"192.168.7.3", "fe80::1"}));
+  ASSERT_TRUE(load_or_create_certificate(all / "another", {"192.168.7.3", "fe80::1"}));
   fs::copy_file(all / "another/remote.pem", file, fs::copy_options::overwrite_existing);
-  const auto again = certificate_in(folder, {"192.168.7.3"});
+  const auto again = load_or_create_certificate(folder, {"192.168.7.3"});
   ASSERT_TRUE(again) << again.message();
   EXPECT_EQ(again->authority, first->authority);
   EXPECT_EQ(trusting(*first, again->pem, "192.168.7.3"), X509_V_OK);
@@ -89,8 +90,8 @@ TEST(Certificate, IsMadeOnceForItsOwnerAlone) {
 
 TEST(Certificate, IsBelievedByWhoTrustsItsAuthorityAndByNobodyElse) {
   const auto made =
-      certificate_in(test::test_folder() / "limn", {"localhost", "192.168.7.2", "studio.local"});
-  const auto another = certificate_in(test::test_folder() / "another", {"192.168.7.2"});
+      load_or_create_certificate(test::test_folder() / "limn", {"localhost", "192.168.7.2", "studio.local"});
+  const auto another = load_or_create_certificate(test::test_folder() / "another", {"192.168.7.2"});
   ASSERT_TRUE(made && another);
   for (const char* host : {"localhost", "192.168.7.2", "studio.local"})
     EXPECT_EQ(trusting(*made, made->pem, host), X509_V_OK) << host;
@@ -100,17 +101,18 @@ TEST(Certificate, IsBelievedByWhoTrustsItsAuthorityAndByNobodyElse) {
 
 TEST(Certificate, OfAnAddressThatAnyoneReachesHasAnAuthorityThatMaySpeakForIt) {
   const fs::path folder = test::test_folder() / "limn";
-  const auto of_office = certificate_in(folder, {"10.0.0.5"});
-  const auto of_campus = certificate_in(folder, {"203.0.113.5", "2001:db8::5", "lab.example.org"});
+  const auto of_office = load_or_create_certificate(folder, {"10.0.0.5"});
+  const auto of_campus =
+      load_or_create_certificate(folder, {"203.0.113.5", "2001:db8::5", "lab.example.org"});
   ASSERT_TRUE(of_office && of_campus);
   EXPECT_NE(of_campus->authority, of_office->authority) << "the first one may not speak for it";
   for (const char* host : {"203.0.113.5", "2001:db8::5", "lab.example.org"})
     EXPECT_EQ(trusting(*of_campus, of_campus->pem, host), X509_V_OK) << host;
-  const auto back = certificate_in(folder, {"10.0.0.5"});
+  const auto back = load_or_create_certificate(folder, {"10.0.0.5"});
   ASSERT_TRUE(back);
   EXPECT_EQ(back->authority, of_campus->authority);
   EXPECT_EQ(trusting(*back, back->pem, "10.0.0.5"), X509_V_OK);
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

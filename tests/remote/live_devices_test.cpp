@@ -28,7 +28,7 @@
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -79,7 +79,7 @@ class LooseCamera : public device::CameraSource {
 };
 
 TEST(Latest, TheNewestWinsAndNothingQueues) {
-  Latest<int> box;
+  apps::Latest<int> box;
   EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
   std::thread writer([&] {
     for (int i = 1; i <= 1000; ++i) box.put(i);
@@ -94,7 +94,7 @@ TEST(Latest, TheNewestWinsAndNothingQueues) {
 
 TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
   const Stamp begun = shifted(Stamp{}, 5000);
-  SourceClock own;  // the session's clock, 30 ms on the way
+  apps::SourceClock own;  // the session's clock, 30 ms on the way
   for (int i = 0; i < 5; ++i) {
     const Stamp now = shifted(begun, 0.1 * i);
     const auto time = own.on_session_clock(shifted(now, -0.03), now);
@@ -110,7 +110,7 @@ TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
     EXPECT_FALSE(next.has_stepped);
     EXPECT_NEAR(seconds_between(next.captured_at, shifted(begun, 1.1)), 0.03, 1e-6);
   }
-  SourceClock video;
+  apps::SourceClock video;
   EXPECT_EQ(video.on_session_clock(Stamp{}, begun).captured_at, begun);
   EXPECT_TRUE(video.is_other());
 }
@@ -133,9 +133,9 @@ class StuckCamera : public device::CameraSource {
 
 TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
   std::promise<void> freed;
-  auto health = std::make_shared<DeviceHealth>();
+  auto health = std::make_shared<apps::DeviceHealth>();
   const std::size_t number = health->add({"camera0", "camera"});
-  auto threads = std::make_unique<CameraThreads>(health);
+  auto threads = std::make_unique<apps::CameraThreads>(health);
   threads->add(std::make_unique<StuckCamera>(freed.get_future().share()), number);
   EXPECT_FALSE(threads->take(std::chrono::milliseconds(10)).has_value());
   const auto begun = std::chrono::steady_clock::now();
@@ -153,8 +153,8 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
 TEST(Recorder, AFrameIsReadAsItWasWatched) {
   const fs::path folder = test::test_folder();
   const sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
-  SessionSetup setup;
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+  apps::SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
   cv::Mat colours(48, 64, CV_8UC3);
@@ -163,18 +163,18 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
   Frame sent = device::decode_frame({jpeg.begin(), jpeg.end()}).value();
   sent.camera = "camera0";
   const Frame taken{"camera0", colours, {}};
-  auto recorder = Recorder::create(folder / "recording", setup).value();
+  auto recorder = apps::Recorder::create(folder / "recording", setup).value();
   recorder->watched(std::vector{sent, taken});
   ASSERT_TRUE(recorder->finish().ok());
-  const auto first = load_frame(folder / "recording/frames/camera0/000000.jpg");
+  const auto first = apps::load_frame(folder / "recording/frames/camera0/000000.jpg");
   ASSERT_TRUE(first) << first.message();
   EXPECT_TRUE(test::image_near(first->image, sent.image, 0, 0, "image"));
   EXPECT_TRUE(test::image_near(first->grey, sent.grey, 0, 0, "brightness"));
   EXPECT_GT(cv::norm(first->grey, to_grey(sent.image), cv::NORM_INF), 0);
-  const auto second = load_frame(folder / "recording/frames/camera0/000001.png");
+  const auto second = apps::load_frame(folder / "recording/frames/camera0/000001.png");
   ASSERT_TRUE(second) << second.message();
   EXPECT_TRUE(test::image_near(second->image, colours, 0, 0, "picture"));
-  EXPECT_FALSE(load_frame(folder / "recording/frames/camera0/000002.jpg"));
+  EXPECT_FALSE(apps::load_frame(folder / "recording/frames/camera0/000002.jpg"));
 }
 
 // Threads as of a real rig, on stored images of the studio at their pace; a recording of it replays as the
@@ -182,9 +182,9 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
 TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const fs::path folder = test::test_folder();
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
-  SessionSetup setup;
+  apps::SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
   sim::VirtualRig room(std::move(world), {.grab_waits_for_light = false});
@@ -194,13 +194,13 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+  auto output = apps::SessionOutput::open(folder / "out", folder / "recording", &setup);
   ASSERT_TRUE(output) << output.message();
-  auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
+  auto perception = apps::Perception::create(setup.scene, setup.rig, setup.watch);
   ASSERT_TRUE(perception) << perception.message();
-  auto session = Session::create(setup, &output->telemetry(), output->recorder());
+  auto session = apps::Session::create(setup, &output->telemetry(), output->recorder());
   ASSERT_TRUE(session) << session.message();
-  SessionDevices devices;
+  apps::SessionDevices devices;
   devices.cameras.push_back(std::make_unique<LooseCamera>(
       device::ImageSequenceCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true})
           .value(),
@@ -220,7 +220,7 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 
   const std::atomic<bool> is_ended = false;
   const auto begun = std::chrono::steady_clock::now();
-  const Status played = play_on_devices(&devices, 2.5, is_ended, {*perception, *session, *output});
+  const Status played = apps::play_on_devices(&devices, 2.5, is_ended, {*perception, *session, *output});
   const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(played.ok()) << played.message();
   EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and an image that was being painted on a slow machine
@@ -238,9 +238,9 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const std::string events = read_file(folder / "recording/events.jsonl").value();
   EXPECT_NE(events.find("frames/camera0/000000.jpg"), std::string::npos);
   EXPECT_EQ(events.find(".png"), std::string::npos);
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
@@ -289,9 +289,9 @@ class RoomProjector : public device::Display {
 TEST(LiveDevices, IsRepairedWhileItRuns) {
   const fs::path folder = test::test_folder();
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
-  SessionSetup setup;
+  apps::SessionSetup setup;
   setup.rig = world.rig;
   setup.rig.provenance_json = R"({"display_latency_ms": {"projector0": 0, "projector1": 0}})";
   setup.scene = *world.scene;
@@ -302,22 +302,22 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
                   {}};
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+  auto output = apps::SessionOutput::open(folder / "out", folder / "recording", &setup);
   ASSERT_TRUE(output) << output.message();
-  auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
-  auto session = Session::create(setup, &output->telemetry(), output->recorder());
+  auto perception = apps::Perception::create(setup.scene, setup.rig, setup.watch);
+  auto session = apps::Session::create(setup, &output->telemetry(), output->recorder());
   ASSERT_TRUE(perception && session);
-  SessionDevices devices;
+  apps::SessionDevices devices;
   devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
   for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
-  // Meanwhile guests are answered, and told how far it is.
+  // Meanwhile guests are answered, and progress how far it is.
   ASSERT_TRUE(make_folder(folder / "page").ok());
   ASSERT_TRUE(write_file(folder / "page/index.html", "<title>Limn</title>").ok());
   const auto server = Server::open({.at = "0", .page = folder / "page", .keys = {}}, {}).value();
   ASSERT_TRUE(session->edit({"repair", "", ""}, "test", {}));
   std::atomic<bool> is_ended = false;
   double longest_s = 0, repair_s = 0;
-  std::set<std::string> told;
+  std::set<std::string> progress;
   std::thread guest([&] {
     const auto ask = [&](const std::string& path, const nlohmann::json& body, const std::string& token) {
       return nlohmann::json::parse(test::RemoteClient(server->port()).post(path, body.dump(), token).body);
@@ -325,11 +325,11 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
     const std::string token = ask("/api/pair", {{"pin", server->invitation().pins[2]}}, "")["token"];
     const auto begun = std::chrono::steady_clock::now();
     for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i) {
-      const auto asked = std::chrono::steady_clock::now();
+      const auto requested_at = std::chrono::steady_clock::now();
       (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
-      longest_s = std::max(longest_s, seconds_between(asked, std::chrono::steady_clock::now()));
+      longest_s = std::max(longest_s, seconds_between(requested_at, std::chrono::steady_clock::now()));
       const std::string state = test::RemoteClient(server->port()).get("/api/state", token).body;
-      told.insert(nlohmann::json::parse(state)["repair"]);
+      progress.insert(nlohmann::json::parse(state)["repair"]);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     repair_s = seconds_between(begun, std::chrono::steady_clock::now());
@@ -337,14 +337,14 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
     is_ended = true;
   });
   const Status played =
-      play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
+      apps::play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
   guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
   ASSERT_TRUE(output->close(&*session, false).ok());
   std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
   EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
-  EXPECT_TRUE(told.contains("computing"));
-  EXPECT_GT(std::count_if(told.begin(), told.end(),
+  EXPECT_TRUE(progress.contains("computing"));
+  EXPECT_GT(std::count_if(progress.begin(), progress.end(),
                           [](const std::string& words) { return words.ends_with(" patterns"); }),
             3);
   EXPECT_EQ(session->recalibration_progress(), "");
@@ -354,17 +354,17 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   EXPECT_TRUE(
       test::pose_near(*session->painted().posed.world_from_prototype, world_from_prototype, 0.2_deg, 1.5_mm));
   EXPECT_GT(cv::countNonZero(session->painted().projectors[1].reshape(1)), 1000);
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 
   // Whatever it is at, it ends in time: with the images that were taken.
   for (const bool is_computing : {false, true}) {
     std::vector<fs::path> shown;
-    auto repair = std::make_unique<LiveRecalibration>(
+    auto repair = std::make_unique<apps::LiveRecalibration>(
         setup.rig, folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
-          Surroundings around;
+          apps::Surroundings around;
           around.stage.show = [&](int projector, const cv::Mat&) -> Status {
             const fs::path images =
                 folder / fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);
@@ -394,11 +394,11 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
 }
 
 TEST(LiveDevices, SaysWhatIsMissing) {
-  SessionDevices devices;
-  const Status checked = check_devices(devices);
+  apps::SessionDevices devices;
+  const Status checked = apps::check_devices(devices);
   ASSERT_FALSE(checked.ok());
   EXPECT_NE(checked.message().find("a camera that works"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

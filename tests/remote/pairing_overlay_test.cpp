@@ -17,7 +17,7 @@
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -26,7 +26,7 @@ const std::string k_text = "https://192.168.107.12:8443/#pin=123456";
 
 // The share of a code's modules that a camera sees otherwise than they are, where it sees the sign's corners.
 double misread(const cv::Mat& seen, const cv::Mat& sign, const std::array<cv::Point2f, 4>& corners) {
-  const cv::Mat code = qr_code(k_text);
+  const cv::Mat code = apps::qr_code(k_text);
   const float width = static_cast<float>(code.cols),
               height = width * static_cast<float>(sign.rows) / static_cast<float>(sign.cols);
   const std::array<cv::Point2f, 4> from = {{{0, 0}, {width, 0}, {width, height}, {0, height}}};
@@ -52,12 +52,12 @@ double misread(const cv::Mat& seen, const cv::Mat& sign, const std::array<cv::Po
 TEST(CodeSign, IsReadOnThePrototype) {
   const fs::path folder = test::test_folder();
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   const device::GlContext context = device::GlContext::create().value();
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
-  const SessionSetup setup{world.rig, *world.scene, {}, {}};
-  Perception perception = Perception::create(setup.scene, setup.rig).value();
-  Session session = Session::create(setup, nullptr, nullptr, false).value();
+  const apps::SessionSetup setup{world.rig, *world.scene, {}, {}};
+  apps::Perception perception = apps::Perception::create(setup.scene, setup.rig).value();
+  apps::Session session = apps::Session::create(setup, nullptr, nullptr, false).value();
   const int camera = 0;
   std::vector<cv::Mat> light;
   for (std::size_t i = 1; i <= 2; ++i) {
@@ -109,4 +109,4 @@ TEST(CodeSign, IsReadOnThePrototype) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -91,7 +91,7 @@ bool RemoteClient::fill(double patience_s) {
   return true;
 }
 
-std::optional<std::string> RemoteClient::take(std::size_t count, double patience_s) {
+std::optional<std::string> RemoteClient::read_bytes(std::size_t count, double patience_s) {
   while (received_.size() < count)
     if (!fill(patience_s)) return std::nullopt;
   std::string out = received_.substr(0, count);
@@ -105,7 +105,7 @@ std::optional<std::string> RemoteClient::take_until(const std::string& end, doub
     if (!fill(patience_s)) return std::nullopt;
     at = received_.find(end);
   }
-  return take(at + end.size(), patience_s);
+  return read_bytes(at + end.size(), patience_s);
 }
 
 RemoteClient::Answer RemoteClient::answer() {
@@ -122,7 +122,7 @@ RemoteClient::Answer RemoteClient::answer() {
     at = end + 2;
   }
   if (out.headers.contains("content-length"))
-    out.body = take(std::stoul(out.headers["content-length"]), 15).value_or("");
+    out.body = read_bytes(std::stoul(out.headers["content-length"]), 15).value_or("");
   return out;
 }
 
@@ -178,17 +178,17 @@ bool RemoteClient::send_frame(int kind, std::string_view bytes) {
 
 std::optional<RemoteClient::Message> RemoteClient::message(double patience_s) {
   for (;;) {
-    const auto head = take(2, patience_s);
+    const auto head = read_bytes(2, patience_s);
     if (!head) return std::nullopt;
     const int kind = (*head)[0] & 0x0f;
     std::uint64_t length = static_cast<unsigned char>((*head)[1]) & 0x7fu;
     if (length >= 126) {
-      const auto more = take(length == 126 ? 2 : 8, patience_s);
+      const auto more = read_bytes(length == 126 ? 2 : 8, patience_s);
       if (!more) return std::nullopt;
       length = 0;
       for (const char c : *more) length = length << 8 | static_cast<unsigned char>(c);
     }
-    auto bytes = take(length, patience_s);
+    auto bytes = read_bytes(length, patience_s);
     if (!bytes || kind == 8) return std::nullopt;
     if (kind == 9)
       send_frame(10, *bytes);

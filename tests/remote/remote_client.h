@@ -59,7 +59,7 @@ class RemoteClient {
   struct Tls;
   bool send_frame(int kind, std::string_view bytes);
   bool fill(double patience_s);
-  std::optional<std::string> take(std::size_t count, double patience_s);
+  std::optional<std::string> read_bytes(std::size_t count, double patience_s);
   std::optional<std::string> take_until(const std::string& end, double patience_s);
 
   int handle_ = -1;

@@ -9,15 +9,15 @@
 
 #include "core/file.h"
 #include "gui/qr_code.h"
-#include "remote/auth_sessions.h"
-#include "remote/http.h"
-#include "remote/messages.h"
-#include "remote/own_addresses.h"
-#include "remote/static_files.h"
-#include "remote/ws_client.h"
+#include "remote/api/auth_sessions.h"
+#include "remote/api/messages.h"
+#include "remote/api/ws_client.h"
+#include "remote/http/http.h"
+#include "remote/http/own_addresses.h"
+#include "remote/http/static_files.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,7 +87,7 @@ TEST(RemoteMessages, AreThoseOfTheDocumentation) {
     std::string text = (*at)[1];
     if (const auto dots = text.find("\"device\": \"…\""); dots != std::string::npos)
       text.replace(dots, std::string("\"device\": \"…\"").size(), "\"device\": \"tablet-0001\"");
-    const auto message = message_of(text);
+    const auto message = parse_message(text);
     EXPECT_TRUE(message) << text << ": " << (message ? "" : message.message());
     types.insert(json::parse(text)["type"].get<std::string>());
   }
@@ -96,7 +96,7 @@ TEST(RemoteMessages, AreThoseOfTheDocumentation) {
 
 TEST(RemoteMessages, EveryActionIsAMessage) {
   for (const scene::Action& action : scene::actions()) {
-    const auto message = message_of(
+    const auto message = parse_message(
         json({{"type", "edit"}, {"id", 7}, {"action", action.name}, {"slot", "mirror"}, {"value", "x"}})
             .dump());
     ASSERT_TRUE(message) << message.message();
@@ -109,7 +109,7 @@ TEST(RemoteMessages, EveryActionIsAMessage) {
 }
 
 std::string refusal_of(const std::string& text) {
-  const auto message = message_of(text);
+  const auto message = parse_message(text);
   return message ? "taken" : message.message();
 }
 
@@ -146,24 +146,24 @@ TEST(RemoteMessages, RefuseWithAReason) {
 }
 
 TEST(RemoteMessages, AWrongOneIsAnsweredByItsId) {
-  EXPECT_EQ(id_of(R"({"type": "edit", "id": 12, "action": "dance"})"), 12u);
-  EXPECT_EQ(id_of(R"({"id": "12"})"), std::nullopt);
-  EXPECT_EQ(id_of("not JSON"), std::nullopt);
+  EXPECT_EQ(parse_message_id(R"({"type": "edit", "id": 12, "action": "dance"})"), 12u);
+  EXPECT_EQ(parse_message_id(R"({"id": "12"})"), std::nullopt);
+  EXPECT_EQ(parse_message_id("not JSON"), std::nullopt);
 }
 
 TEST(RemoteMessages, FramesHaveANumberAndAJpeg) {
   std::vector<std::uint8_t> bytes = {1, 2, 0, 0, 0xff, 0xd8, 0xff, 0xe0};
-  const auto frame = frame_of(bytes);
+  const auto frame = parse_frame(bytes);
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(frame->number, 513u);
   EXPECT_EQ(frame->jpeg.size(), 4u);
   EXPECT_EQ(frame->jpeg.data(), bytes.data() + 4);
   bytes[5] = 0;
-  EXPECT_FALSE(frame_of(bytes));
-  EXPECT_FALSE(frame_of({}));
+  EXPECT_FALSE(parse_frame(bytes));
+  EXPECT_FALSE(parse_frame({}));
   std::vector<std::uint8_t> huge(k_longest_frame + 1, 0xd8);
   huge[4] = 0xff;
-  EXPECT_FALSE(frame_of(huge));
+  EXPECT_FALSE(parse_frame(huge));
 }
 
 TEST(RemoteMessages, ImagesAreWrittenAsTheDocumentationSays) {
@@ -174,23 +174,23 @@ TEST(RemoteMessages, ImagesAreWrittenAsTheDocumentationSays) {
 }
 
 TEST(RemoteMessages, APairingNeedsSixDigits) {
-  EXPECT_EQ(pair_of_body(R"({"pin": "012345", "name": "Ann"})").value().name, "Ann");
-  EXPECT_EQ(pair_of_body(R"({"pin": "012345"})").value().name, "guest");
+  EXPECT_EQ(parse_pairing(R"({"pin": "012345", "name": "Ann"})").value().name, "Ann");
+  EXPECT_EQ(parse_pairing(R"({"pin": "012345"})").value().name, "guest");
   for (const char* wrong : {R"({"pin": "12345"})", R"({"pin": "1234567"})", R"({"pin": "12345a"})",
                             R"({"pin": 123456})", R"({"name": "Ann"})"})
-    EXPECT_FALSE(pair_of_body(wrong)) << wrong;
-  EXPECT_FALSE(pair_of_body(json({{"pin", "012345"}, {"name", std::string(65, 'A')}}).dump()));
+    EXPECT_FALSE(parse_pairing(wrong)) << wrong;
+  EXPECT_FALSE(parse_pairing(json({{"pin", "012345"}, {"name", std::string(65, 'A')}}).dump()));
 }
 
 // The log says whose an edit was: a guest is not to pass for Limn itself.
 TEST(RemoteMessages, AGuestHasNoNameOfLimnsOwn) {
   const auto named = [](const std::string& name) {
-    return pair_of_body(json({{"pin", "012345"}, {"name", name}}).dump());
+    return parse_pairing(json({{"pin", "012345"}, {"name", name}}).dump());
   };
   for (const char* own : {"operator", " Operator ", "KEY", "script", "osc", "Limn", "aruco_4x4_50:0"}) {
-    const auto wish = named(own);
-    ASSERT_FALSE(wish) << own;
-    EXPECT_NE(wish.message().find("name: expected a name"), std::string::npos) << wish.message();
+    const auto pairing = named(own);
+    ASSERT_FALSE(pairing) << own;
+    EXPECT_NE(pairing.message().find("name: expected a name"), std::string::npos) << pairing.message();
   }
   EXPECT_EQ(named("  Ann B. ")->name, "Ann B.");
   EXPECT_EQ(named("my operator")->name, "my operator");
@@ -243,7 +243,7 @@ TEST(AuthSessions, APinGivesItsRoleAndATokenThatEnds) {
     other.back() = other.back() == '0' ? '1' : '0';
     EXPECT_FALSE(guests.find(other, now));
     EXPECT_FALSE(guests.find(token.substr(1), now));
-    guests.leave(found->number);
+    guests.end_session(found->number);
     EXPECT_FALSE(guests.find(token, now)) << "a session that was left is replayed";
   }
   EXPECT_EQ(tokens.size(), 3u);
@@ -257,7 +257,7 @@ TEST(AuthSessions, AfterTenWrongPinsAnAddressWaits) {
   const std::string wrong = wrong_pin(guests), right = guests.pin(Role::look);
   auto wait = k_first_wait;
   for (int round = 0; round < 6; ++round) {
-    for (int i = 0; i < k_most_wrong; ++i)
+    for (int i = 0; i < k_max_wrong_pins; ++i)
       EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", "10.0.0.1", now)));
     const auto held = guests.pair(right, "", "10.0.0.1", now + 1s);
     ASSERT_TRUE(std::holds_alternative<AuthSessions::Wait>(held));
@@ -274,7 +274,7 @@ TEST(AuthSessions, AfterAHundredWrongPinsEverybodyWaits) {
   AuthSessions guests;
   const AuthSessions::Time now{};
   const std::string wrong = wrong_pin(guests);
-  for (int i = 0; i < k_most_wrong_of_all; ++i)
+  for (int i = 0; i < k_max_wrong_pins_of_all; ++i)
     EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(
         guests.pair(wrong, "", fmt::format("10.0.{}.1", i), now)));
   EXPECT_TRUE(
@@ -285,7 +285,7 @@ TEST(AuthSessions, ANetworkOfIPv6IsOnePlace) {
   AuthSessions guests;
   const AuthSessions::Time now{};
   const std::string wrong = wrong_pin(guests);
-  for (int i = 0; i < k_most_wrong; ++i) guests.pair(wrong, "", fmt::format("2001:db8::{}", i + 1), now);
+  for (int i = 0; i < k_max_wrong_pins; ++i) guests.pair(wrong, "", fmt::format("2001:db8::{}", i + 1), now);
   EXPECT_TRUE(std::holds_alternative<AuthSessions::Wait>(guests.pair(wrong, "", "2001:db8::ffff", now)));
   EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", "2001:db8:0:1::1", now)));
 }
@@ -294,46 +294,46 @@ TEST(AuthSessions, SessionsAreBounded) {
   AuthSessions guests;
   const AuthSessions::Time now{};
   std::string first;
-  for (std::size_t i = 0; i < k_most_sessions + 10; ++i) {
+  for (std::size_t i = 0; i < k_max_sessions + 10; ++i) {
     const auto paired = guests.pair(guests.pin(Role::look), "", "10.0.0.1", now);
     if (i == 0) first = std::get<AuthSessions::Paired>(paired).token;
   }
-  EXPECT_EQ(guests.count(), k_most_sessions);
+  EXPECT_EQ(guests.count(), k_max_sessions);
   EXPECT_FALSE(guests.find(first, now));
 }
 
 TEST(Outbox, KeepsTheNewestAlone) {
   Outbox outbox;
   const auto text = [](const char* words) { return std::make_shared<const std::string>(words); };
-  outbox.tell_state(text("old"));
-  outbox.tell_state(text("new"));
-  outbox.show(ImageKind::room, text("old room"));
-  outbox.show(ImageKind::room, text("new room"));
-  outbox.answer("done");
+  outbox.set_state(text("old"));
+  outbox.set_state(text("new"));
+  outbox.set_image(ImageKind::room, text("old room"));
+  outbox.set_image(ImageKind::room, text("new room"));
+  outbox.add_answer("done");
   std::vector<std::string> all;
-  while (const auto next = outbox.next()) all.push_back(*next->bytes);
+  while (const auto next = outbox.next_message()) all.push_back(*next->bytes);
   EXPECT_EQ(all, (std::vector<std::string>{"done", "new", "new room"}));
   EXPECT_FALSE(outbox.is_over());
 }
 
 TEST(Outbox, EndsWhenAnswersAreNotRead) {
   Outbox outbox;
-  for (std::size_t i = 0; i < k_most_answers; ++i) outbox.answer("done");
+  for (std::size_t i = 0; i < k_max_answers; ++i) outbox.add_answer("done");
   EXPECT_FALSE(outbox.is_over());
-  outbox.answer("one more");
-  const auto bye = outbox.next();
+  outbox.add_answer("one more");
+  const auto bye = outbox.next_message();
   ASSERT_TRUE(bye);
   EXPECT_NE(bye->bytes->find("\"bye\""), std::string::npos);
-  EXPECT_FALSE(outbox.next());
+  EXPECT_FALSE(outbox.next_message());
   EXPECT_TRUE(outbox.is_over());
 }
 
 TEST(Pace, LetsABurstThroughAndThenSoManyASecond) {
-  Pace pace(10, 5);
-  Pace::Time now{};
+  RateLimit pace(10, 5);
+  RateLimit::Time now{};
   const auto taken = [&](int count) {
     int out = 0;
-    for (int i = 0; i < count; ++i) out += pace.takes(now);
+    for (int i = 0; i < count; ++i) out += pace.allows(now);
     return out;
   };
   EXPECT_EQ(taken(20), 5);
@@ -360,8 +360,8 @@ TEST(OwnAddresses, KnowWhoCanReachThem) {
   for (const char* own : {"127.0.0.1", "127.3.2.1", "::1"}) EXPECT_TRUE(is_loopback(own)) << own;
   for (const char* other : {"0.0.0.0", "192.168.7.2", "::", "128.0.0.1", "localhost", "127.0.0.1.example"})
     EXPECT_FALSE(is_loopback(other)) << other;
-  EXPECT_TRUE(is_any("0.0.0.0"));
-  EXPECT_TRUE(is_any("::"));
+  EXPECT_TRUE(is_unspecified("0.0.0.0"));
+  EXPECT_TRUE(is_unspecified("::"));
 }
 
 TEST(StaticFiles, AreTheFolderAsItWasAndNothingElse) {
@@ -387,7 +387,7 @@ TEST(StaticFiles, AreTheFolderAsItWasAndNothingElse) {
 }
 
 TEST(QrCode, HasAMarginAndThreeEyes) {
-  const cv::Mat code = qr_code("https://192.168.7.2:8443/#pin=123456");
+  const cv::Mat code = apps::qr_code("https://192.168.7.2:8443/#pin=123456");
   ASSERT_FALSE(code.empty());
   EXPECT_EQ(code.rows, code.cols);
   const int last = code.cols - 1 - 4;
@@ -395,8 +395,8 @@ TEST(QrCode, HasAMarginAndThreeEyes) {
   for (int i = 0; i < code.cols; ++i) EXPECT_FALSE(is_black(i, 3));
   for (int i = 0; i < 7; ++i)
     EXPECT_TRUE(is_black(4 + i, 4) && is_black(last - i, 4) && is_black(4 + i, last)) << i;
-  EXPECT_TRUE(qr_code(std::string(3000, 'x')).empty());
+  EXPECT_TRUE(apps::qr_code(std::string(3000, 'x')).empty());
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -2,10 +2,10 @@
 // are tests/apps/remote_client.
 #include <sys/resource.h>
 
-#include "remote/own_addresses.h"
+#include "remote/http/own_addresses.h"
 #include "tests/remote/a_server.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 const std::string k_jpeg = "\xff\xd8\xff\xd9";  // its first and last bytes
@@ -29,7 +29,7 @@ TEST_F(AServer, GivesThePageAndGuardsIt) {
 }
 
 TEST_F(AServer, ShowsNothingElseWithoutPairing) {
-  open({}, eyes_that_echo());
+  open({}, echoing_providers());
   for (const char* path :
        {"/api/state", "/api/actions", "/api/live", "/api/edit", "/api/leave", "/api/nothing",
         "/picture/room.jpg", "/picture/projector/projector0.jpg", "/picture/variant/mirror/a.png",
@@ -99,7 +99,7 @@ TEST_F(AServer, LimitsWrongPins) {
   open();
   const std::string wrong = json({{"pin", wrong_pin()}}).dump(),
                     right = json({{"pin", pin(Role::look)}}).dump();
-  for (int i = 0; i < k_most_wrong; ++i) EXPECT_EQ(client()->post("/api/pair", wrong).status, 401) << i;
+  for (int i = 0; i < k_max_wrong_pins; ++i) EXPECT_EQ(client()->post("/api/pair", wrong).status, 401) << i;
   const auto held = client()->post("/api/pair", right);
   EXPECT_EQ(held.status, 429) << "a right PIN after too many wrong ones";
   EXPECT_LE(std::stoi(held.headers.at("retry-after")), 60);
@@ -209,14 +209,14 @@ TEST_F(AServer, AThousandConnectionsAreShedAndOthersServed) {
   const auto before = guest(Role::look);
   std::vector<std::unique_ptr<RemoteClient>> crowd;
   for (int i = 0; i < 1000; ++i) crowd.push_back(client());
-  int told = 0;
+  int refused = 0;
   for (const auto& each : crowd) {
     each->send("GET / HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
     const int status = each->answer().status;
     EXPECT_TRUE(status == 200 || status == 503 || status == 0) << status;
-    told += status == 503;
+    refused += status == 503;
   }
-  EXPECT_GE(told, 16) << "some are told why";
+  EXPECT_GE(refused, 16) << "some are told why";
   // Who was there before was served meanwhile, and there is room again.
   EXPECT_TRUE(before->send_text("not JSON"));
   EXPECT_TRUE(before->message_of("refused"));
@@ -245,7 +245,7 @@ TEST_F(AServer, HoldsNoMoreThanItsConnections) {
 }
 
 TEST_F(AServer, AnswersEveryFrameOfAWindowWithItsNumber) {
-  open({}, eyes_that_echo(5ms));
+  open({}, echoing_providers(5ms));
   const auto tablet = guest(Role::look);
   tablet->send_text(R"({"type": "window", "device": "tablet-0001", "on": true})");
   for (std::uint32_t i = 1; i <= 20; ++i) {
@@ -262,9 +262,9 @@ TEST_F(AServer, AnswersEveryFrameOfAWindowWithItsNumber) {
 }
 
 TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
-  open({}, eyes_that_echo());
+  open({}, echoing_providers());
   std::vector<std::unique_ptr<RemoteClient>> tablets;
-  for (std::ptrdiff_t i = 0; i <= k_most_windows; ++i) {
+  for (std::ptrdiff_t i = 0; i <= k_max_windows; ++i) {
     tablets.push_back(guest(Role::look));
     tablets.back()->send_text(
         fmt::format(R"({{"type": "window", "device": "tablet-{:04}", "on": true}})", i));
@@ -279,18 +279,17 @@ TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
 // Two windows of one guest, as of two tabs of a browser: light follows the one that was opened last, and the
 // other one only when that has been still for a second.
 TEST_F(AServer, OneWindowOfAGuestIsItsTablet) {
-  ImageProviders eyes;
+  ImageProviders providers;
   std::mutex mutex;
   std::map<std::string, std::string> named;  // by device
-  eyes.look = [&](const TabletView::Window& window, std::vector<std::uint8_t>,
-                  ImageProviders::Answer answer) {
+  providers.draw_window = [&](const TabletWindow& window, std::vector<std::uint8_t>, ImageCallback answer) {
     {
       const std::lock_guard lock(mutex);
       named[window.device] = window.guest;
     }
     answer({R"({"sees": "markers"})", {0xff, 0xd8}, Eigen::Vector3d(window.device == "tablet-0001", 0, 0)});
   };
-  open({}, eyes);
+  open({}, providers);
   const std::string token = token_of(Role::work);
   const auto window = [&](const std::string& device) {
     auto out = client();
@@ -321,9 +320,9 @@ TEST_F(AServer, OneWindowOfAGuestIsItsTablet) {
 }
 
 TEST_F(AServer, SaysWhyThereIsNoRoomImage) {
-  ImageProviders eyes;
-  eyes.room = [](ImageProviders::Answer answer) { answer({R"({"why":"no camera"})", {}}); };
-  open({}, eyes);
+  ImageProviders providers;
+  providers.draw_room = [](ImageCallback answer) { answer({R"({"why":"no camera"})", {}}); };
+  open({}, providers);
   const auto one = guest(Role::look);
   one->send_text(R"({"type": "pictures", "room": true})");
   const auto image = one->message();
@@ -333,7 +332,7 @@ TEST_F(AServer, SaysWhyThereIsNoRoomImage) {
 }
 
 TEST_F(AServer, LooksAtTheNewestOfFramesThatComeTogether) {
-  open({}, eyes_that_echo(200ms));
+  open({}, echoing_providers(200ms));
   const auto tablet = guest(Role::look);
   tablet->send_text(R"({"type": "window", "device": "tablet-0001", "on": true})");
   for (std::uint32_t i = 1; i <= 10; ++i) tablet->send_binary(number_bytes(i) + k_jpeg);
@@ -343,7 +342,7 @@ TEST_F(AServer, LooksAtTheNewestOfFramesThatComeTogether) {
 }
 
 TEST_F(AServer, RefusesLargeFramesAndForgetsHalfOnes) {
-  open({}, eyes_that_echo());
+  open({}, echoing_providers());
   const auto large = guest(Role::look);
   large->send_text(R"({"type": "window", "device": "tablet-0001", "on": true})");
   large->send_binary(number_bytes(1) + "\xff\xd8" + std::string(20'000'000, 'x'));
@@ -365,7 +364,7 @@ TEST_F(AServer, RefusesLargeFramesAndForgetsHalfOnes) {
 }
 
 TEST_F(AServer, SendsRoomImagesOneInFlight) {
-  open({}, eyes_that_echo());
+  open({}, echoing_providers());
   const auto one = guest(Role::look), other = guest(Role::look);
   for (const auto* each : {&one, &other}) (*each)->send_text(R"({"type": "pictures", "room": true})");
   std::uint32_t last = 0;
@@ -386,7 +385,7 @@ TEST_F(AServer, SendsRoomImagesOneInFlight) {
 TEST_F(AServer, CutsWhoDoesNotRead) {
   ServeOptions options;
   options.limits.write = 500ms;
-  open(options, eyes_that_echo(0ms, 3'000'000));
+  open(options, echoing_providers(0ms, 3'000'000));
   const auto slow = guest(Role::look);
   slow->read_little();
   slow->send_text(R"({"type": "window", "device": "tablet-0001", "on": true})");
@@ -421,7 +420,7 @@ TEST_F(AServer, SpeaksTlsAllTheWay) {
   ServeOptions options;
   options.always_encrypted = true;
   options.limits.read = 500ms;
-  open(options, eyes_that_echo());
+  open(options, echoing_providers());
   const auto first = client();
   EXPECT_EQ(first->fingerprint(), server_->invitation().fingerprint);
   const auto paired = first->post("/api/pair", json({{"pin", pin(Role::look)}}).dump());
@@ -459,7 +458,7 @@ TEST_F(AServer, TellsOfAPortThatIsTaken) {
 }
 
 TEST_F(AServer, EndsInUnderASecondWithGuestsInTheHouse) {
-  open({}, eyes_that_echo(300ms));
+  open({}, echoing_providers(300ms));
   std::vector<std::unique_ptr<RemoteClient>> guests;
   for (int i = 0; i < 8; ++i) guests.push_back(guest(Role::look));
   guests[0]->send_text(R"({"type": "window", "device": "tablet-0001", "on": true})");
@@ -474,4 +473,4 @@ TEST_F(AServer, EndsInUnderASecondWithGuestsInTheHouse) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

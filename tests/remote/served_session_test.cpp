@@ -23,7 +23,7 @@
 #include "tests/remote/virtual_tablet.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 // A session with a virtual rig's scene, served, and played by hand: one turn is what the loop does between
@@ -32,39 +32,39 @@ class AServedSession : public AServer {
  protected:
   void SetUp() override {
     AServer::SetUp();
-    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image);
+    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image);
     ASSERT_TRUE(world) << world.message();
     ASSERT_TRUE(scale_resolution(0.25, &world->rig).ok());
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
-    SessionSetup setup;
+    apps::SessionSetup setup;
     setup.rig = world->rig;
     setup.scene = *world->scene;
     setup.scene.folder = folder_ / "project";
     setup.screens = {"wall", "desk"};
     fs::create_directories(setup.scene.folder);
-    auto telemetry = Telemetry::create({});
+    auto telemetry = apps::Telemetry::create({});
     ASSERT_TRUE(telemetry);
     telemetry_.emplace(std::move(*telemetry));
-    auto session = Session::create(setup, &*telemetry_, nullptr);
+    auto session = apps::Session::create(setup, &*telemetry_, nullptr);
     ASSERT_TRUE(session) << session.message();
     session_.emplace(std::move(*session));
     health_.add({.name = "camera0", .kind = "camera"});
-    open({}, eyes_that_echo());
+    open({}, echoing_providers());
   }
   void TearDown() override { server_.reset(); }
 
   // What a projector shows, as the frame loop hands it over.
   cv::Mat lit_by(std::size_t projector) {
-    return with_overlays(session_->painted(), session_->setup().rig,
-                         server_->overlays(&*session_))[projector];
+    return apps::with_overlays(session_->painted(), session_->setup().rig,
+                               server_->overlays(&*session_))[projector];
   }
 
   void turn() {
     at_ = shifted(at_, 0.01);
-    server_->hear(&*session_, at_);
-    server_->tell(*session_, *telemetry_, health_, at_);
+    server_->apply_edits(&*session_, at_);
+    server_->publish_state(*session_, *telemetry_, health_, at_);
   }
   // Plays the session while guests do something on another thread.
   void play_while(const std::function<void()>& guests) {
@@ -82,9 +82,9 @@ class AServedSession : public AServer {
 
   Stamp at_;
   std::optional<device::GlContext> context_;
-  std::optional<Telemetry> telemetry_;
-  std::optional<Session> session_;
-  DeviceHealth health_;
+  std::optional<apps::Telemetry> telemetry_;
+  std::optional<apps::Session> session_;
+  apps::DeviceHealth health_;
 };
 
 TEST_F(AServedSession, AnEditReachesItAndEverybodySeesIt) {
@@ -201,7 +201,7 @@ TEST_F(AServedSession, AFloodOfEditsIsTakenInPortions) {
   turn();
   const double first_mm = 1e3 * session_->show_state().slots[0].nudge.x();
   EXPECT_GT(first_mm, 0);
-  EXPECT_LE(first_mm, Server::k_most_at_once + 1e-6);
+  EXPECT_LE(first_mm, Server::k_max_edits_at_once + 1e-6);
   for (int i = 0; i < 100; ++i) turn();
   EXPECT_NEAR(1e3 * session_->show_state().slots[0].nudge.x(), 100, 1e-6);
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(ann->message_of("done")) << i;
@@ -319,8 +319,8 @@ TEST_F(AServedSession, GivesImagesAndAssemblies) {
 // A code in a projector's light is for those who stand there.
 TEST_F(AServedSession, ProjectsACodeForAWhile) {
   ServeOptions options;
-  options.code_lasts = 1500ms;
-  open(options, eyes_that_echo());
+  options.code_duration = 1500ms;
+  open(options, echoing_providers());
   session_->paint(at_, at_);
   const cv::Mat painted = session_->painted().projectors[0].clone();
   const auto is_painted = [&](const cv::Mat& lit) { return cv::norm(lit, painted, cv::NORM_INF) == 0; };
@@ -371,7 +371,7 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
     }
   });
   EXPECT_LT(seconds_since(begun), 1.4) << "too slow a machine for this test";
-  std::this_thread::sleep_until(begun + options.code_lasts);
+  std::this_thread::sleep_until(begun + options.code_duration);
   EXPECT_TRUE(is_painted(lit_by(0)));
   EXPECT_EQ(server_->code_projector(), "");
 }
@@ -515,11 +515,11 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
   files.rlim_cur = std::min<rlim_t>(files.rlim_max, 8192);
   ::setrlimit(RLIMIT_NOFILE, &files);
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   ASSERT_TRUE(scale_resolution(0.25, &world.rig).ok());
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  const SessionSetup& setup = session_->setup();
-  Perception perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
+  const apps::SessionSetup& setup = session_->setup();
+  apps::Perception perception = apps::Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto tablet_view = TabletView::create(setup, folder_ / "lenses");
   ASSERT_TRUE(tablet_view) << tablet_view.message();
   open({}, image_providers(std::move(*tablet_view)));
@@ -540,10 +540,10 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
       at_ = rig.now();
       EXPECT_TRUE(session_->edit({"nudge", "mirror", count % 2 ? "0.2 0 0" : "-0.2 0 0"}, "test", at_));
       double guests_ms = -thread_ms();
-      server_->hear(&*session_, at_);
-      server_->tell(*session_, *telemetry_, health_, at_);
+      server_->apply_edits(&*session_, at_);
+      server_->publish_state(*session_, *telemetry_, health_, at_);
       guests_ms += thread_ms();
-      const ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
+      const apps::ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);
       for (std::size_t i = 0; i < painted.projectors.size(); ++i)
         EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(lit_by(i)));
@@ -613,14 +613,14 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
   world.replace(world.find("../scenes/door"), 14, "door");
   ASSERT_TRUE(write_file(folder / "world.json", world));
   ::setenv("XDG_CONFIG_HOME", folder.c_str(), 1);
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.25;
   options.world = folder / "world.json";
   options.seconds = 1e5;  // ended below
   options.serve = "0";
   options.record = folder / "recording";
   // What a tablet sees of the room.
-  sim::World seen = sim::load_world(folder / "world.json", marker_image).value();
+  sim::World seen = sim::load_world(folder / "world.json", apps::marker_image).value();
   std::vector<cv::Mat> dark;
   for (const Imager& p : seen.rig.projectors) dark.push_back(cv::Mat::zeros(p.height, p.width, CV_8UC3));
   const Eigen::Vector3d p_middle = seen.world_from_prototype.translation;
@@ -681,11 +681,11 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
   EXPECT_EQ(state["slots"][0]["variant"], "sport");
   EXPECT_EQ(state["last_edit"]["who"], "Ann");
   EXPECT_EQ(state["looks"], json({"by Ann"}));
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << (replayed ? "" : replayed.message());
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

@@ -27,7 +27,7 @@
 #include "tracker/family.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::remote {
 namespace {
 
 namespace fs = std::filesystem;
@@ -48,14 +48,14 @@ class Room {
   explicit Room(const fs::path& lens_folder, double resolution = 0.5, double frame_period_s = 1 / 30.0)
       : context_(device::GlContext::create().value()) {
     sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
     EXPECT_TRUE(scale_resolution(resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_.emplace(std::move(world),
                  sim::VirtualRigOptions{.frame_period_s = frame_period_s, .grab_waits_for_light = false});
-    perception_ = Perception::create(setup_.scene, setup_.rig).value();
-    session_ = Session::create(setup_, nullptr, nullptr, false).value();
+    perception_ = apps::Perception::create(setup_.scene, setup_.rig).value();
+    session_ = apps::Session::create(setup_, nullptr, nullptr, false).value();
     tablet_view_ = TabletView::create(setup_, lens_folder).value();
     for (int i = 0; i < 8; ++i) step();
   }
@@ -64,26 +64,26 @@ class Room {
   void step() {
     const int camera = 0;
     session_->take(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
-    const ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
+    const apps::ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig_->projector(static_cast<int>(k)).show(painted.projectors[k]).value();
-    tablet_view_->know(*session_);
+    tablet_view_->update_session(*session_);
   }
 
   struct Window {
-    json said;
+    json reply;
     cv::Mat image;
     std::vector<std::uint8_t> jpeg;
-    std::optional<Eigen::Vector3d> p_eye_world;
+    std::optional<Eigen::Vector3d> p_viewpoint_world;
   };
-  Window look(const std::string& device,
-              std::vector<std::uint8_t> jpeg,
-              TabletViewMode parts = TabletViewMode::as_screen) {
-    std::promise<TabletView::Seen> answered;
-    tablet_view_->look({device, "", parts}, std::move(jpeg),
-                       [&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
-    TabletView::Seen seen = answered.get_future().get();
-    Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_eye_world};
+  Window draw_window(const std::string& device,
+                     std::vector<std::uint8_t> jpeg,
+                     TabletViewMode parts = TabletViewMode::as_screen) {
+    std::promise<CompositeImage> answered;
+    tablet_view_->draw_window({device, "", parts}, std::move(jpeg),
+                              [&](CompositeImage seen) { answered.set_value(std::move(seen)); });
+    CompositeImage seen = answered.get_future().get();
+    Window window{json::parse(seen.json), {}, seen.jpeg, seen.p_viewpoint_world};
     if (!seen.jpeg.empty()) window.image = device::decode_jpeg(seen.jpeg).value();
     return window;
   }
@@ -93,16 +93,16 @@ class Room {
   }
 
   TabletView& tablet_view() { return *tablet_view_; }
-  void end_onlooker() { tablet_view_.reset(); }
-  Session& session() { return *session_; }
+  void destroy_tablet_view() { tablet_view_.reset(); }
+  apps::Session& session() { return *session_; }
   sim::VirtualRig& rig() { return *rig_; }
 
  private:
   device::GlContext context_;
-  SessionSetup setup_;
+  apps::SessionSetup setup_;
   std::optional<sim::VirtualRig> rig_;
-  std::optional<Perception> perception_;
-  std::optional<Session> session_;
+  std::optional<apps::Perception> perception_;
+  std::optional<apps::Session> session_;
   std::unique_ptr<TabletView> tablet_view_;
   std::size_t moments_ = 0;
 };
@@ -120,10 +120,10 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world, const scene::P
   return points;
 }
 
-Imager view_of(const json& said, const Imager& truth) {
+Imager view_of(const json& reply, const Imager& truth) {
   Imager view = truth;
-  view.lens = Lens::create(said["lens"]["model"], said["lens"]["values"]).value();
-  view.imager_from_world = pose_of(said["view_from_world"]);
+  view.lens = Lens::create(reply["lens"]["model"], reply["lens"]["values"]).value();
+  view.imager_from_world = pose_of(reply["view_from_world"]);
   return view;
 }
 
@@ -150,9 +150,9 @@ TEST(Tablet, PartAndImageLieOnEachOtherAfterTenSecondsOfLookingRound) {
   int count = 0, judged = 0;
   for (int i = 0; i < 100; ++i) {
     const test::TabletShot shot = tablet.shoot(0.1 * i);
-    const Room::Window window = room.look(k_tablet, shot.jpeg);
-    ASSERT_EQ(window.said["sees"], "prototype") << i << ": " << window.said.dump();
-    const Imager view = view_of(window.said, shot.camera);
+    const Room::Window window = room.draw_window(k_tablet, shot.jpeg);
+    ASSERT_EQ(window.reply["sees"], "prototype") << i << ": " << window.reply.dump();
+    const Imager view = view_of(window.reply, shot.camera);
     double here = 0;
     int seen = 0;
     for (const Eigen::Vector3d& p : points) {
@@ -164,12 +164,12 @@ TEST(Tablet, PartAndImageLieOnEachOtherAfterTenSecondsOfLookingRound) {
     if (i >= 80) squares += here, count += seen;
     // The focal length is as sure as it says it is.
     const double focal_off = view.lens.fx() - shot.camera.lens.fx();
-    EXPECT_LT(std::abs(focal_off), 4 * window.said["lens"]["focal_stddev_px"].get<double>() + 0.15) << i;
+    EXPECT_LT(std::abs(focal_off), 4 * window.reply["lens"]["focal_stddev_px"].get<double>() + 0.15) << i;
     if (i % 33 != 0) continue;
     const double part_px = std::sqrt(here / seen);
     std::printf("%5.1f s: %4.2f px, %d markers, rms %.2f px, focal length %.1f +- %.1f (true %.1f)\n",
-                0.1 * i, part_px, window.said["markers"].get<int>(), window.said["rms_px"].get<double>(),
-                view.lens.fx(), window.said["lens"]["focal_stddev_px"].get<double>(), shot.camera.lens.fx());
+                0.1 * i, part_px, window.reply["markers"].get<int>(), window.reply["rms_px"].get<double>(),
+                view.lens.fx(), window.reply["lens"]["focal_stddev_px"].get<double>(), shot.camera.lens.fx());
     ASSERT_TRUE(write_png(folder / fmt::format("sent-{}.png", i), shot.image));
     ASSERT_TRUE(write_png(folder / fmt::format("seen-{}.png", i), window.image));
     // The mirror that was drawn, and the one that belongs there.
@@ -249,22 +249,22 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   const fs::path folder = test::test_folder();
   constexpr double k_period_s = 0.1;
   Room room(folder / "lenses", 0.25, k_period_s);
-  Session& session = room.session();
+  apps::Session& session = room.session();
   const sim::World& world = room.rig().world();
   test::VirtualTablet tablet = room.tablet(6);
-  for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
+  for (int i = 0; i < 4; ++i) room.draw_window(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
   const Eigen::Vector3d p_middle = world.world_from_prototype.translation;
   const Pose aside = looking_at(p_middle + Eigen::Vector3d(-0.5, -0.55, 0.1), p_middle, {0, 0, 1});
-  const Room::Window seen = room.look(k_tablet, tablet.shoot_from(aside).jpeg);
-  ASSERT_TRUE(seen.p_eye_world.has_value()) << seen.said.dump();
+  const Room::Window seen = room.draw_window(k_tablet, tablet.shoot_from(aside).jpeg);
+  ASSERT_TRUE(seen.p_viewpoint_world.has_value()) << seen.reply.dump();
   const Eigen::Vector3d p_tablet = aside.inverse().translation,
                         p_own =
                             session.setup().scene.viewers[0].fixed->imager_from_world.inverse().translation;
-  EXPECT_LT((*seen.p_eye_world - p_tablet).norm(), 0.01);
+  EXPECT_LT((*seen.p_viewpoint_world - p_tablet).norm(), 0.01);
 
   // Nobody has asked for it.
   for (int i = 0; i < 3; ++i) {
-    session.see("Ann", seen.p_eye_world, room.rig().now());
+    session.see("Ann", seen.p_viewpoint_world, room.rig().now());
     room.step();
   }
   EXPECT_FALSE(session.painted().p_guest_eye_world.has_value());
@@ -278,7 +278,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   double farthest_m = 0;
   const auto steps = [&](int count, bool is_seen) {
     for (int i = 0; i < count; ++i) {
-      if (is_seen) session.see("Ann", seen.p_eye_world, room.rig().now());
+      if (is_seen) session.see("Ann", seen.p_viewpoint_world, room.rig().now());
       session.see("Ben", p_middle + Eigen::Vector3d(1, -1, 0), room.rig().now());
       room.step();
       const Eigen::Vector3d p_now = session.painted().p_guest_eye_world.value_or(p_own);
@@ -288,12 +288,12 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   };
   steps(11, true);
   EXPECT_EQ(session.painted().follows, "Ann");
-  EXPECT_LT((p_before - *seen.p_eye_world).norm(), 1e-6);
+  EXPECT_LT((p_before - *seen.p_viewpoint_world).norm(), 1e-6);
   const LitMirror followed =
       lit_mirror(world, session.painted().projectors, aside, folder / "lit-for-the-tablet");
   std::printf("light of the mirror: %.1f mm off, overlap %.2f; followed %.1f mm, %.2f; eye %.1f mm off; %s\n",
               before.off_mm, before.overlap, followed.off_mm, followed.overlap,
-              1e3 * (*seen.p_eye_world - p_tablet).norm(), folder.c_str());
+              1e3 * (*seen.p_viewpoint_world - p_tablet).norm(), folder.c_str());
   EXPECT_GT(before.off_mm, 15);
   EXPECT_LT(before.overlap, 0.6);
   EXPECT_LT(followed.off_mm, 2);
@@ -322,20 +322,20 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
 TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses", 0.25);
-  Session& session = room.session();
+  apps::Session& session = room.session();
   const auto edit = [&](const char* action, const char* slot, const char* value) {
     const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
     EXPECT_TRUE(done.ok()) << done.message();
-    room.tablet_view().know(session);
+    room.tablet_view().update_session(session);
   };
   test::VirtualTablet tablet = room.tablet(7);
-  for (int i = 0; i < 4; ++i) room.look(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
+  for (int i = 0; i < 4; ++i) room.draw_window(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
   const Eigen::Vector3d p_middle = room.rig().world().world_from_prototype.translation;
   const test::TabletShot shot = tablet.shoot_from(
       looking_at(p_middle + Eigen::Vector3d(-0.1, -0.7, 0.1), p_middle, Eigen::Vector3d::UnitZ()));
   const cv::Mat sent = device::decode_jpeg(shot.jpeg).value();
   const auto shown = [&](const char* name, TabletViewMode parts) {
-    cv::Mat image = room.look(k_tablet, shot.jpeg, parts).image;
+    cv::Mat image = room.draw_window(k_tablet, shot.jpeg, parts).image;
     EXPECT_TRUE(write_png(folder / (std::string(name) + ".png"), image));
     return image;
   };
@@ -373,9 +373,9 @@ TEST(Tablet, AMendedRigIsDrawnWith) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses", 0.25);
   const auto image = [&](TabletView* tablet_view) {
-    tablet_view->know(room.session());
-    std::promise<TabletView::Seen> answered;
-    tablet_view->room([&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
+    tablet_view->update_session(room.session());
+    std::promise<CompositeImage> answered;
+    tablet_view->draw_room([&](CompositeImage seen) { answered.set_value(std::move(seen)); });
     return device::decode_jpeg(answered.get_future().get().jpeg).value();
   };
   const cv::Mat before = image(&room.tablet_view());
@@ -392,45 +392,45 @@ TEST(Tablet, WhatCannotBeLookedAtIsAnsweredWithWhy) {
   Room room(test::test_folder() / "lenses");
   test::VirtualTablet tablet = room.tablet(3);
   const test::TabletShot shot = tablet.shoot(0);
-  const auto said = [&](const std::string& device, std::vector<std::uint8_t> jpeg) {
-    const Room::Window window = room.look(device, std::move(jpeg));
+  const auto reply = [&](const std::string& device, std::vector<std::uint8_t> jpeg) {
+    const Room::Window window = room.draw_window(device, std::move(jpeg));
     EXPECT_TRUE(window.jpeg.empty());
-    EXPECT_EQ(window.said["sees"], "nothing");
-    EXPECT_FALSE(window.said.contains("view_from_world"));
-    return window.said["why"].get<std::string>();
+    EXPECT_EQ(window.reply["sees"], "nothing");
+    EXPECT_FALSE(window.reply.contains("view_from_world"));
+    return window.reply["why"].get<std::string>();
   };
   const std::string text = "<html>not a picture</html>";
-  EXPECT_NE(said(k_tablet, {}).find("something else"), std::string::npos);
-  EXPECT_NE(said(k_tablet, {text.begin(), text.end()}).find("something else"), std::string::npos);
-  EXPECT_NE(said(k_tablet, std::vector<std::uint8_t>(20 << 20, 0xff)).find("at most 4 MB"),
+  EXPECT_NE(reply(k_tablet, {}).find("something else"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, {text.begin(), text.end()}).find("something else"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, std::vector<std::uint8_t>(20 << 20, 0xff)).find("at most 4 MB"),
             std::string::npos);
   std::vector<std::uint8_t> half = shot.jpeg;
   half.resize(half.size() / 2);
-  EXPECT_NE(said(k_tablet, half).find("truncated or damaged"), std::string::npos);
-  EXPECT_NE(said(k_tablet, device::encode_jpeg(cv::Mat(16, 5000, CV_8U, cv::Scalar(9)), 50)).find("5000x16"),
+  EXPECT_NE(reply(k_tablet, half).find("truncated or damaged"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, device::encode_jpeg(cv::Mat(16, 5000, CV_8U, cv::Scalar(9)), 50)).find("5000x16"),
             std::string::npos);
   std::vector<std::uint8_t> scans = shot.jpeg;
   for (int i = 0; i < 500; ++i) scans.insert(scans.end(), {0xff, 0xda});
-  EXPECT_NE(said(k_tablet, scans).find("scans"), std::string::npos);
-  EXPECT_NE(said("../../etc", shot.jpeg).find("device"), std::string::npos);
-  EXPECT_NE(said(k_tablet, device::encode_jpeg(cv::Mat(1, 1, CV_8U, cv::Scalar(9)), 50)).find("No markers"),
+  EXPECT_NE(reply(k_tablet, scans).find("scans"), std::string::npos);
+  EXPECT_NE(reply("../../etc", shot.jpeg).find("device"), std::string::npos);
+  EXPECT_NE(reply(k_tablet, device::encode_jpeg(cv::Mat(1, 1, CV_8U, cv::Scalar(9)), 50)).find("No markers"),
             std::string::npos);
   // A wall: no markers. The room's image stands in.
   const Pose aside = looking_at({0, -1, 0.5}, {0, -3, 0.5}, Eigen::Vector3d::UnitZ());
-  EXPECT_NE(said(k_tablet, tablet.shoot_from(aside).jpeg).find("No markers"), std::string::npos);
-  std::promise<TabletView::Seen> answered;
-  room.tablet_view().room([&](TabletView::Seen seen) { answered.set_value(std::move(seen)); });
-  const TabletView::Seen seen = answered.get_future().get();
+  EXPECT_NE(reply(k_tablet, tablet.shoot_from(aside).jpeg).find("No markers"), std::string::npos);
+  std::promise<CompositeImage> answered;
+  room.tablet_view().draw_room([&](CompositeImage seen) { answered.set_value(std::move(seen)); });
+  const CompositeImage seen = answered.get_future().get();
   EXPECT_EQ(json::parse(seen.json)["why"], "");
   const auto image = device::decode_jpeg(seen.jpeg);
   ASSERT_TRUE(image);
   EXPECT_EQ(image->size(), cv::Size(960, 540));
   ASSERT_TRUE(write_png(test::test_folder() / "room.png", *image));
   // After all that an image is an image; a large one comes back smaller.
-  EXPECT_EQ(room.look(k_tablet, shot.jpeg).image.size(), cv::Size(k_width, k_height));
+  EXPECT_EQ(room.draw_window(k_tablet, shot.jpeg).image.size(), cv::Size(k_width, k_height));
   test::VirtualTablet large = room.tablet(3, 2560, 1600);
-  const Room::Window window = room.look(k_tablet, large.shoot(0).jpeg);
-  EXPECT_EQ(window.said["sees"], "prototype") << window.said.dump();
+  const Room::Window window = room.draw_window(k_tablet, large.shoot(0).jpeg);
+  EXPECT_EQ(window.reply["sees"], "prototype") << window.reply.dump();
   EXPECT_EQ(window.image.size(), cv::Size(1280, 800));
 }
 
@@ -443,17 +443,18 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   constexpr int k_images = 12;
   struct Answers {
     std::mutex mutex;
-    std::vector<std::vector<json>> said = std::vector<std::vector<json>>(2 * k_images);
+    std::vector<std::vector<json>> reply = std::vector<std::vector<json>>(2 * k_images);
     int count = 0;
   } answers;
   for (int i = 0; i < 2 * k_images; ++i) {
     const bool is_one = i % 2 == 0;
-    room.tablet_view().look({is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
-                            [&answers, i](TabletView::Seen seen) {
-                              const std::lock_guard lock(answers.mutex);
-                              answers.said[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
-                              ++answers.count;
-                            });
+    room.tablet_view().draw_window(
+        {is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
+        [&answers, i](CompositeImage seen) {
+          const std::lock_guard lock(answers.mutex);
+          answers.reply[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
+          ++answers.count;
+        });
   }
   for (int i = 0; i < 600; ++i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -462,23 +463,23 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
   }
   int drawn = 0;
   for (int i = 0; i < 2 * k_images; ++i) {
-    const auto& said = answers.said[static_cast<std::size_t>(i)];
-    ASSERT_EQ(said.size(), 1u) << i;
-    if (said[0]["sees"] == "nothing") {
+    const auto& reply = answers.reply[static_cast<std::size_t>(i)];
+    ASSERT_EQ(reply.size(), 1u) << i;
+    if (reply[0]["sees"] == "nothing") {
       EXPECT_LT(i, 2 * k_images - 2) << "the newest";
       continue;
     }
     ++drawn;
     const Imager& truth = (i % 2 == 0 ? one : other).camera;
-    EXPECT_TRUE(test::pose_near(pose_of(said[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
+    EXPECT_TRUE(test::pose_near(pose_of(reply[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
   }
   EXPECT_LT(drawn, 2 * k_images);
   // What still waits at the end is told so.
-  std::promise<TabletView::Seen> late;
-  room.tablet_view().look({k_tablet}, one.jpeg, [](const TabletView::Seen&) {});
-  room.tablet_view().look({"tablet-late"}, one.jpeg,
-                          [&](TabletView::Seen seen) { late.set_value(std::move(seen)); });
-  room.end_onlooker();
+  std::promise<CompositeImage> late;
+  room.tablet_view().draw_window({k_tablet}, one.jpeg, [](const CompositeImage&) {});
+  room.tablet_view().draw_window({"tablet-late"}, one.jpeg,
+                                 [&](CompositeImage seen) { late.set_value(std::move(seen)); });
+  room.destroy_tablet_view();
   EXPECT_EQ(late.get_future().wait_for(std::chrono::seconds(0)), std::future_status::ready);
   // What was found of the lenses is kept.
   EXPECT_EQ(load_lenses(lenses, "tablet-one").size(), 1u);
@@ -487,7 +488,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
 
 TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnImage) {
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   const scene::Scene scene = *world.scene;
   const std::vector<Body> bodies = scene::bodies(scene);
   // What the session takes to be true.
@@ -508,16 +509,16 @@ TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnImage) {
   for (const Imager& p : world.rig.projectors)
     white.emplace_back(p.height, p.width, CV_8UC3, cv::Scalar::all(150));
   test::VirtualTablet tablet(world, white, k_width, k_height, 4);
-  TabletLocalizer eye(tracker::Families::load(tracker::families_of(bodies), scene.folder).value());
+  TabletLocalizer localizer(tracker::Families::load(tracker::families_of(bodies), scene.folder).value());
   int found = 0;
   for (int i = 0; i < 12; ++i) {
     const test::TabletShot shot = tablet.shoot(0.4 * i);
-    const TabletPose sight = eye.look(shot.image, bodies, tracks);
-    eye.learn();
-    ASSERT_TRUE(sight.view.has_value()) << sight.why;
+    const TabletPose pose = localizer.localize(shot.image, bodies, tracks);
+    localizer.update_intrinsics();
+    ASSERT_TRUE(pose.view.has_value()) << pose.why;
     if (i < 4) continue;  // the lens is new
-    EXPECT_TRUE(test::pose_near(sight.view->imager_from_world, shot.camera.imager_from_world, 0.005, 0.004));
-    for (const Track& track : sight.moved) {
+    EXPECT_TRUE(test::pose_near(pose.view->imager_from_world, shot.camera.imager_from_world, 0.005, 0.004));
+    for (const Track& track : pose.moved) {
       EXPECT_EQ(track.body, "mirror");
       EXPECT_LT((track.world_from_body.translation - tracks[1].world_from_body.translation - way).norm(),
                 0.01);
@@ -553,4 +554,4 @@ TEST(Tablet, LensesThatAreKeptAreThereAgainAndDamagedOnesAreNot) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::remote

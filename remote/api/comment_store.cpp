@@ -1,0 +1,58 @@
+#include "remote/api/comment_store.h"
+
+#include <algorithm>
+
+#include "core/log.h"
+#include "remote/api/responses.h"
+
+namespace limn::remote {
+namespace {
+
+constexpr const char* k_comments_file = "comments.json";
+
+}  // namespace
+
+void CommentStore::load_once(const std::filesystem::path& scene_folder) {
+  if (comments_) return;
+  comments_ = scene::load_comments(scene_folder / k_comments_file);
+  if (!*comments_) log_warning("live: {} Nobody can comment.", comments_->message());
+}
+
+std::optional<HttpResponse> CommentStore::add(const AuthSessions::Guest& guest,
+                                              const CommentRequest& request,
+                                              const SessionNews* news,
+                                              Saved saved) {
+  if (guest.role < Role::work) return role_refusal(guest, "comment", Role::work);
+  if (!comments_ || !news) return error_response(k_http_unavailable, "the session has not begun yet.");
+  if (!*comments_) return error_response(k_http_unavailable, comments_->message());
+  if (!request.slot.empty() && !news->scene->find_slot(request.slot))
+    return error_response(k_http_bad_request, "slot: expected one of the state, found another.");
+  const std::vector<std::string>& looks = news->state.looks;
+  if (!request.look.empty() && std::find(looks.begin(), looks.end(), request.look) == looks.end())
+    return error_response(k_http_bad_request, "look: expected one of the state, found another.");
+  auto comment = scene::make_comment(guest.name, request.look, request.slot, request.text);
+  if (!comment) return error_response(k_http_bad_request, comment.message());
+  std::vector<scene::Comment>& all = **comments_;
+  if (all.size() >= scene::k_most_comments)
+    return error_response(k_http_unavailable,
+                          fmt::format("the project keeps {} comments at most.", all.size()));
+  all.push_back(std::move(*comment));
+  const bool is_queued = worker_->take(
+      [post = post_, all, saved = std::move(saved), path = news->scene->folder / k_comments_file] {
+        const Status status = scene::save_comments(path, all);
+        post([saved, why = status ? "" : status.message()] { saved(why); });
+      });
+  if (!is_queued) {
+    all.pop_back();
+    return error_response(k_http_unavailable, "too much is being saved. Try again in a moment.");
+  }
+  return std::nullopt;
+}
+
+std::span<const scene::Comment> CommentStore::newest() const {
+  if (!comments_ || !*comments_) return {};
+  const std::span<const scene::Comment> all = **comments_;
+  return all.last(std::min(all.size(), k_max_published_comments));
+}
+
+}  // namespace limn::remote

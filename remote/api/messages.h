@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/result.h"
+#include "remote/tablet/tablet_view_mode.h"
+#include "scene/actions.h"
+#include "scene/comments.h"
+
+namespace limn::remote {
+
+/// The longest texts that are accepted, bytes. (A comment may have scene::k_longest_comment.)
+constexpr std::size_t k_longest_message = 16 * 1024, k_longest_word = 200, k_longest_guest_name = 64;
+/// The longest frame of a window: its number and a JPEG.
+constexpr std::size_t k_longest_jpeg = 4 * 1024 * 1024, k_longest_frame = 4 + k_longest_jpeg;
+
+/// A comment that a guest writes about a look or a slot's part; both names may be empty.
+struct CommentRequest {
+  std::string look, slot, text;
+};
+
+/// The messages that the page sends over its WebSocket (docs/remote.md).
+struct EditMessage {
+  std::uint64_t id = 0;  ///< The page's number for the message; the answer has it, too.
+  scene::Edit edit;
+};
+struct CommentMessage {
+  std::uint64_t id = 0;  ///< As above.
+  CommentRequest comment;
+};
+/// `pictures`: begins or ends images of the room.
+struct ImagesMessage {
+  bool room = false;
+};
+/// `seen`: the page has shown this image of the room.
+struct ImageShownMessage {
+  std::uint32_t image = 0;
+};
+/// `window`: opens, changes or closes the window through the tablet's camera.
+struct WindowMessage {
+  std::string device;
+  bool on = false;
+  TabletViewMode parts = TabletViewMode::as_screen;
+};
+using Message = std::variant<EditMessage, CommentMessage, ImagesMessage, ImageShownMessage, WindowMessage>;
+
+/// Parses a text message. Errors say what was expected: no JSON object, an unknown type or action, keys that
+/// are missing, unknown or of another type, text that is too long or has control characters. Whether slots,
+/// variants and looks exist is checked elsewhere.
+Result<Message> parse_message(std::string_view text);
+/// The id of a message that parse_message() refuses; nullopt: it has none.
+std::optional<std::uint64_t> parse_message_id(std::string_view text);
+
+/// The body of a request for pairing.
+struct PairRequest {
+  std::string pin;   ///< Six digits.
+  std::string name;  ///< Without blanks around it; "guest" when it was left out or empty.
+};
+/// Names that the log uses for Limn's own actions. No guest can have one, in upper or lower case, nor a name
+/// with
+/// ':', as markers have.
+const std::vector<std::string>& reserved_names();
+/// Parse the bodies of HTTP requests; errors as above.
+Result<PairRequest> parse_pairing(std::string_view text);
+Result<scene::Edit> parse_edit(std::string_view text);
+Result<CommentRequest> parse_comment(std::string_view text);
+/// Checks that a body is {}.
+Status parse_empty_body(std::string_view text);
+
+/// A frame of a window, as a binary message. Errors: too short, too long, no JPEG.
+struct FrameMessage {
+  std::uint32_t number = 0;
+  std::span<const std::uint8_t> jpeg;  ///< Refers to the message's bytes.
+};
+Result<FrameMessage> parse_frame(std::span<const std::uint8_t> bytes);
+
+/// Makes a binary message to the page: kind, number, JSON and image.
+enum class ImageKind : std::uint32_t { room = 1, window = 2 };
+std::string image_message(ImageKind kind,
+                          std::uint32_t number,
+                          const std::string& json,
+                          std::span<const std::uint8_t> jpeg);
+
+}  // namespace limn::remote

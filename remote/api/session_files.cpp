@@ -1,0 +1,132 @@
+#include "remote/api/session_files.h"
+
+#include <algorithm>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "core/file.h"
+#include "device/jpeg.h"
+#include "remote/api/responses.h"
+#include "scene/glb.h"
+
+namespace limn::remote {
+namespace {
+
+constexpr int k_projector_jpeg_quality = 85;
+
+// The decoded name between the two ends of a path; nullopt: the path has other ends, or the name is
+// malformed.
+std::optional<std::string> name_in(const std::string& path, std::string_view begin, std::string_view end) {
+  if (path.size() <= begin.size() + end.size() || !path.starts_with(begin) || !path.ends_with(end))
+    return std::nullopt;
+  return decoded(std::string_view(path).substr(begin.size(), path.size() - begin.size() - end.size()));
+}
+
+// A look's parts on the prototype as a glTF file; empty: the look has no parts and there is no prototype.
+std::string look_assembly(const scene::Scene& scene, const scene::Look& look) {
+  std::vector<scene::GlbNode> nodes;
+  if (scene.prototype) nodes.push_back({"prototype", &scene.prototype->mesh, Pose()});
+  for (const scene::Look::Part& part : look.parts) {
+    const scene::Slot* slot = scene.find_slot(part.slot);
+    if (!slot) continue;
+    for (const scene::Variant& variant : slot->variants)
+      if (variant.name == part.variant)
+        nodes.push_back({part.slot + " " + part.variant, &variant.mesh, part.prototype_from_part});
+  }
+  return nodes.empty() ? "" : scene::encode_glb(nodes);
+}
+
+}  // namespace
+
+SessionFiles::SessionFiles(WorkerThread* worker)
+    : worker_(worker),
+      encoded_projectors_(std::make_shared<std::map<std::string, EncodedImage>>()),
+      thumbnails_(std::make_shared<Thumbnails>()) {}
+
+void SessionFiles::respond_from_worker(std::function<HttpResponse()> job, ResponseCallback respond) {
+  if (!worker_->take([job = std::move(job), respond] { respond(job()); }))
+    respond(error_response(k_http_unavailable, "too many pictures are asked for at once."));
+}
+
+void SessionFiles::send_projector_image(const std::string& path,
+                                        const SessionNews* news,
+                                        ResponseCallback respond) {
+  const auto name = name_in(path, "/picture/projector/", ".jpg");
+  std::size_t index = 0;
+  const std::size_t count = news ? std::min(news->state.projectors.size(), news->projector_images.size()) : 0;
+  while (name && index < count && news->state.projectors[index] != *name) ++index;
+  if (!name || index >= count || news->projector_images[index].empty())
+    return respond(
+        error_response(k_http_not_found, "expected a projector of the state, found another name."));
+  respond_from_worker(
+      [cache = encoded_projectors_, name = *name, image = news->projector_images[index]] {
+        EncodedImage& encoded = (*cache)[name];
+        if (!encoded.jpeg || encoded.image.data != image.data) {
+          const auto jpeg = device::encode_jpeg(image, k_projector_jpeg_quality);
+          encoded = {image, std::make_shared<const std::string>(jpeg.begin(), jpeg.end())};
+        }
+        return uncached_response("image/jpeg", *encoded.jpeg);
+      },
+      std::move(respond));
+}
+
+void SessionFiles::send_look_image(const std::string& path,
+                                   const SessionNews* news,
+                                   ResponseCallback respond) {
+  const auto name = name_in(path, "/picture/look/", ".png");
+  const auto is_look = [&] {
+    const std::vector<std::string>& looks = news->state.looks;
+    return std::find(looks.begin(), looks.end(), *name) != looks.end();
+  };
+  if (!name || !news || !is_look())
+    return respond(error_response(k_http_not_found, "expected a look of the state, found another name."));
+  respond_from_worker(
+      [file = news->scene->folder / "looks" / (*name + ".png")] {
+        auto png = read_file(file);
+        return png ? uncached_response("image/png", std::move(*png))
+                   : error_response(k_http_not_found, "this look has no picture.");
+      },
+      std::move(respond));
+}
+
+void SessionFiles::send_look_assembly(const std::string& path,
+                                      const SessionNews* news,
+                                      ResponseCallback respond) {
+  const auto name = name_in(path, "/look/", ".glb");
+  const scene::Look* look = nullptr;
+  if (name && news)
+    for (const scene::Look& each : news->looks)
+      if (each.name == *name) look = &each;
+  if (!look)
+    return respond(error_response(k_http_not_found, "expected a look of the state, found another name."));
+  respond_from_worker(
+      [scene = news->scene, look = *look] {
+        const std::string bytes = look_assembly(*scene, look);
+        return bytes.empty() ? error_response(k_http_not_found, "this look has no parts.")
+                             : uncached_response("model/gltf-binary", bytes);
+      },
+      std::move(respond));
+}
+
+void SessionFiles::send_variant_image(const std::string& path,
+                                      const SessionNews* news,
+                                      ResponseCallback respond) {
+  constexpr std::string_view k_begin = "/picture/variant/";
+  const auto slash = path.find('/', k_begin.size());
+  const auto slot = slash == std::string::npos
+                        ? std::nullopt
+                        : decoded(std::string_view(path).substr(k_begin.size(), slash - k_begin.size()));
+  const auto variant = name_in(path, path.substr(0, slash) + "/", ".png");
+  if (!slot || !variant || !news)
+    return respond(
+        error_response(k_http_not_found, "expected a slot and a variant of the state, found others."));
+  respond_from_worker(
+      [thumbnails = thumbnails_, scene = news->scene, slot = *slot, variant = *variant] {
+        const auto png = thumbnails->png(scene, slot, variant);
+        return png ? uncached_response("image/png", **png) : error_response(k_http_not_found, png.message());
+      },
+      std::move(respond));
+}
+
+}  // namespace limn::remote

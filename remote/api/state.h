@@ -1,0 +1,67 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/pose.h"
+#include "scene/show_state.h"
+#include "session/device_health.h"
+#include "session/session.h"
+#include "session/telemetry.h"
+
+namespace limn::remote {
+
+/// The session's part of the state that guests get ("The state" of docs/remote.md). Clients and comments are
+/// added by StatePublisher.
+struct SessionState {
+  struct Slot {
+    std::string name, variant;
+    std::vector<std::string> variants;
+    Eigen::Vector3d nudge_mm = Eigen::Vector3d::Zero();
+    bool is_held = false;
+    std::string tracking;  ///< "seen", "carried on" or "lost".
+    std::string marker;
+    std::string material;                     ///< In the words of its action; empty: the file's material.
+    std::vector<std::string> dropped;         ///< Variants whose unit can be chosen.
+    std::optional<Pose> prototype_from_part;  ///< nullopt: the part is not shown.
+  };
+  struct Note {
+    double at_s = 0;  ///< Since the session began.
+    std::string text;
+  };
+  std::vector<Slot> slots;
+  std::string prototype;  ///< Its tracking, as a slot's; empty: the scene has none.
+  std::vector<std::string> looks;
+  std::string look, other_look, deleted_look;
+  bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
+  double split_mm = 0;
+  std::string light;   ///< In the words of its action; empty: the scene's; `other`: not expressible in them.
+  std::string screen;  ///< What was last chosen for all screens.
+  std::vector<scene::Output> outputs;
+  std::string viewer;   ///< The guest who is chosen as the viewer; empty: the scene's own viewer.
+  std::string follows;  ///< The guest whose tablet is the viewpoint now; empty: none.
+  std::vector<std::string> windows;  ///< Guests whose tablets can be the viewpoint.
+  std::string repair;                ///< Progress of the recalibration; empty: none runs.
+  std::vector<std::string> projectors;
+  std::vector<apps::DeviceState> devices;
+  std::vector<std::string> waiting;  ///< Loose markers that can be paired.
+  std::vector<Note> notes;           ///< The newest last.
+  std::optional<apps::Edited> last_edit;
+};
+
+/// The state of a session. `begun_at` is when it began; the times of notes count from there.
+SessionState session_state(const apps::Session& session,
+                           const apps::Telemetry& telemetry,
+                           const apps::DeviceHealth& health,
+                           Stamp begun_at);
+
+/// A state in which poses that differ from the published ones by less than the tracker's jitter (0.05 mm,
+/// 0.03 degrees) are the published ones.
+SessionState without_jitter(SessionState state, const SessionState& published);
+
+/// The members of the state message, without number, last_edit, guests and comments.
+nlohmann::ordered_json to_json(const SessionState& state);
+
+}  // namespace limn::remote

@@ -1,0 +1,93 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "remote/api/auth_sessions.h"
+#include "remote/api/messages.h"
+#include "remote/http/http_handler.h"
+
+namespace limn::remote {
+
+/// Answers that may wait for a client that does not read; with one more the connection ends.
+constexpr std::size_t k_max_answers = 512;
+/// Messages that a client may send, per second on average and at once.
+constexpr double k_messages_per_s = 120, k_messages_at_once = 240;
+
+/// What waits to be sent to a client. Of states and images only the newest is kept, so that a slow reader
+/// costs no memory and gets nothing outdated.
+class Outbox {
+ public:
+  void add_answer(std::string text);
+  void set_state(std::shared_ptr<const std::string> text) { state_ = std::move(text); }
+  void set_image(ImageKind kind, std::shared_ptr<const std::string> bytes);
+  /// Sends `bye` with a reason and then ends the connection. A second call does nothing.
+  void end(const std::string& why);
+
+  /// The message to send next; nullopt: there is none now, or never again when is_over().
+  std::optional<Outgoing> next_message();
+  bool is_over() const { return is_ending_ && !bye_; }
+
+ private:
+  std::deque<std::string> answers_;
+  std::shared_ptr<const std::string> state_, room_, window_;
+  std::shared_ptr<const std::string> bye_;
+  bool is_ending_ = false;
+};
+
+/// Limits how often something happens: a number of times per second, and a number of times at once.
+class RateLimit {
+ public:
+  using Time = std::chrono::steady_clock::time_point;
+  RateLimit(double per_second, double at_once) : per_second_(per_second), at_once_(at_once), left_(at_once) {}
+  /// Whether it may happen once more, now. If so, it is counted.
+  bool allows(Time now);
+
+ private:
+  double per_second_, at_once_, left_;
+  std::optional<Time> last_;
+};
+
+/// A client: one WebSocket of a paired guest. A guest can have several. Belongs to the network's thread.
+struct WsClient {
+  /// Images of the room (RoomImagePublisher).
+  struct Room {
+    bool is_wanted = false;
+    std::optional<std::uint32_t> in_flight;  ///< The image that was sent and that the page has not shown yet.
+    std::optional<std::uint32_t> last_sent;
+  };
+  struct Frame {
+    std::uint32_t number = 0;
+    std::vector<std::uint8_t> jpeg;
+  };
+  /// The window through a tablet's camera (TabletWindows).
+  struct Window {
+    std::string device;  ///< Empty: the window is closed.
+    TabletViewMode parts = TabletViewMode::as_screen;
+    std::optional<std::uint32_t> frame_in_flight;  ///< The frame that is being drawn into.
+    std::chrono::steady_clock::time_point frame_since;
+    std::optional<Frame> next_frame;  ///< The newest frame that came meanwhile.
+
+    bool is_open() const { return !device.empty(); }
+  };
+
+  AuthSessions::Guest guest;
+  Outbox outbox;
+  std::function<void()> wake;  ///< Tells the connection that the outbox has something new.
+  RateLimit rate_limit{k_messages_per_s, k_messages_at_once};
+  Room room;
+  Window window;
+
+  /// The longest message that it may send now, bytes.
+  std::size_t longest_message() const { return window.is_open() ? k_longest_frame : k_longest_message; }
+};
+
+using WsClients = std::vector<std::shared_ptr<WsClient>>;
+
+}  // namespace limn::remote

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "remote/tablet/tablet_view.h"
+
+namespace limn::remote {
+
+/// The functions that draw images for guests: the live composite, and the window into a tablet's own images.
+/// They return at once and call back exactly once, on another thread, at the latest when these functions are
+/// destroyed. An empty function says that there are no such images.
+struct ImageProviders {
+  /// Called after every frame of the session, on its thread.
+  std::function<void(const apps::Session&)> update_session;
+  std::function<void(const TabletWindow&, std::vector<std::uint8_t> jpeg, ImageCallback)> draw_window;
+  std::function<void(ImageCallback)> draw_room;
+};
+
+/// The functions of a tablet view, which lives as long as they do.
+inline ImageProviders image_providers(std::unique_ptr<TabletView> tablet_view) {
+  const std::shared_ptr<TabletView> shared = std::move(tablet_view);
+  return {[shared](const apps::Session& session) { shared->update_session(session); },
+          [shared](const TabletWindow& window, std::vector<std::uint8_t> jpeg, ImageCallback answer) {
+            shared->draw_window(window, std::move(jpeg), std::move(answer));
+          },
+          [shared](ImageCallback answer) { shared->draw_room(std::move(answer)); }};
+}
+
+}  // namespace limn::remote
