@@ -42,7 +42,7 @@ ordered_json to_json(const PoseJudged& judged) {
   for (const calib::DeviceQuality& device : assessment.devices)
     json["coverage"][device.name] = device.coverage;
   json["faults"] = ordered_json::array();
-  for (const calib::Fault& fault : assessment.faults) json["faults"].push_back(fault.name);
+  for (const calib::Fault& fault : assessment.faults) json["faults"].push_back(calib::to_text(fault.name));
   json["more_helps"] = judged.more_helps;
   return json;
 }
@@ -72,7 +72,7 @@ std::string to_json(const Calibrated& done) {
 
 void say_end(const CalibrateOptions& options, const Calibrated& done, const Say& say) {
   for (const calib::Fault& fault : done.report.assessment.faults)
-    say(fmt::format("fault {}: {}; {}.", fault.name, fault.evidence, fault.advice));
+    say(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
   for (const std::string& sentence : done.report.explanation.advice) say("advice: " + sentence);
   std::vector<std::string> times;
   for (const auto& [projector, seconds] : done.capture_s)
@@ -217,9 +217,6 @@ Status run_calibrate(const CalibrateOptions& options) {
     return usage_error(
         "calibrate: expected either --plan (a virtual rig) or --devices with --board, found {}.",
         options.plan.empty() ? "neither" : "both");
-  const std::vector<std::string>& codes = calib::pattern_codes();
-  if (std::find(codes.begin(), codes.end(), options.code) == codes.end())
-    return usage_error("--code: expected {}, found '{}'.", fmt::join(codes, ", "), options.code);
   return options.devices.empty() ? calibrate_virtually(options) : calibrate_devices(options);
 }
 

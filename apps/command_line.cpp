@@ -6,6 +6,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "apps/align.h"
 #include "apps/bench.h"
@@ -28,6 +29,7 @@
 #include "apps/scan.h"
 #include "apps/simulate.h"
 #include "apps/solve.h"
+#include "core/enum_names.h"
 #include "core/log.h"
 #include "core/version.h"
 
@@ -41,6 +43,32 @@ int finished(const Status& status) {
   if (status) return 0;
   log_warning("limn: {}", status.message());
   return status.error().wrong_usage ? 2 : 1;
+}
+
+constexpr EnumNames<bool, 2> k_off_on{{"off", "on"}};
+
+// An option whose value is one of an enum's names. The help shows the present value as the default.
+template <class Enum, std::size_t Count>
+CLI::Option* add_choice(CLI::App* command,
+                        const std::string& name,
+                        Enum* value,
+                        const EnumNames<Enum, Count>& names,
+                        const std::string& help) {
+  const auto keep = [value, &names](const std::string& text) { *value = names.find(text).value(); };
+  return command->add_option_function<std::string>(name, keep, help)
+      ->check(CLI::IsMember(names.all()))
+      ->default_str(names.text(*value));
+}
+
+// The same for an option without a default.
+template <class Enum, std::size_t Count>
+CLI::Option* add_choice(CLI::App* command,
+                        const std::string& name,
+                        std::optional<Enum>* value,
+                        const EnumNames<Enum, Count>& names,
+                        const std::string& help) {
+  const auto keep = [value, &names](const std::string& text) { *value = names.find(text); };
+  return command->add_option_function<std::string>(name, keep, help)->check(CLI::IsMember(names.all()));
 }
 
 void add_demo(CLI::App& app, Run& run) {
@@ -129,14 +157,10 @@ void add_detect(CLI::App& app, Run& run) {
                       "Camera file: .cameramodel, OpenCV YAML or ARToolKit camera_para.dat");
   command->add_option("--size-mm", options->size_mm,
                       "Side of the black square in mm; with --camera it gives poses");
-  command
-      ->add_option("--pose", options->pose,
-                   "How poses are computed: ippe, or triangle (the method of the 2011 paper)")
-      ->capture_default_str();
-  command
-      ->add_option("--encoding", options->encoding,
-                   "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)")
-      ->capture_default_str();
+  add_choice(command, "--pose", &options->pose, k_pose_methods,
+             "How poses are computed: ippe, or triangle (the method of the 2011 paper)");
+  add_choice(command, "--encoding", &options->encoding, tracker::k_encodings,
+             "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)");
   command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
   command->add_option("--json", options->json, "JSON file to write: corners, poses, covariances");
   command->add_option("--draw", options->draw, "Folder for copies of the images with the markers drawn in");
@@ -204,9 +228,8 @@ void add_patterns(CLI::App& app, Run& run) {
   auto options = std::make_shared<PatternsOptions>();
   command->add_option("--projector", options->projector, "Size of the projector in pixels, such as 1280x800")
       ->required();
-  command
-      ->add_option("--code", options->code, "Code: gray, phase (most accurate) or xor (for concave surfaces)")
-      ->capture_default_str();
+  add_choice(command, "--code", &options->code, calib::k_pattern_codes,
+             "Code: gray, phase (most accurate) or xor (for concave surfaces)");
   auto& code = options->code_options;
   command->add_option("--period", code.period_px, "With phase: length of a wave in projector pixels")
       ->capture_default_str();
@@ -258,7 +281,8 @@ void add_solve(CLI::App& app, Run& run) {
       ->allow_extra_args(false);
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print report.json instead of a table");
-  command->add_option("--import", options->import_format, "Read captures of another program: opencv-gray");
+  add_choice(command, "--import", &options->import_format, k_import_formats,
+             "Read captures of another program: opencv-gray");
   command->add_option("--projector", options->projector,
                       "With --import: size of the projector in pixels, such as 1024x768");
   command->add_option("--board", options->board,
@@ -295,9 +319,9 @@ void add_calibrate(CLI::App& app, Run& run) {
       ->add_option("--board", options->board,
                    "With --devices: the board, written as for limn markers --board")
       ->needs(devices);
-  command->add_option("--code", options->code, "With --devices: code of the patterns, gray, phase or xor")
-      ->needs(devices)
-      ->capture_default_str();
+  add_choice(command, "--code", &options->code, calib::k_pattern_codes,
+             "With --devices: code of the patterns, gray, phase or xor")
+      ->needs(devices);
   command
       ->add_option(
           "--scene", options->scene,
@@ -415,11 +439,12 @@ void add_align(CLI::App& app, Run& run) {
   command->add_option(
       "--scan", options->scan,
       "Scan: a PLY file or the folder of limn scan; without it the pose is computed from the markers alone");
-  command->add_option("--scan-units", options->scan_units, "Unit of the PLY file: m, cm, mm, in or ft")
-      ->capture_default_str();
+  add_choice(command, "--scan-units", &options->scan_units, scene::k_length_units,
+             "Unit of the PLY file: m, cm, mm, in or ft");
   command->add_option("--mesh", options->mesh,
                       "CAD mesh: .glb, .gltf, .obj, .stl or .ply; without it the scene's prototype");
-  command->add_option("--units", options->units, "Unit of the CAD mesh: m, cm, mm, in or ft");
+  add_choice(command, "--units", &options->units, scene::k_length_units,
+             "Unit of the CAD mesh: m, cm, mm, in or ft");
   command->add_option("--start", options->start, "POSES.json with world_from_prototype, the initial pose");
   command->add_option("--points", options->points,
                       "PICKS.json: three or more pairs of corresponding points on CAD and scan");
@@ -464,37 +489,25 @@ void add_render(CLI::App& app, Run& run) {
   command->add_option("--viewer", options->viewers,
                       "Viewer file; repeat the option for several viewers, who share one viewpoint in which "
                       "the nearest counts most. Without it: the scene's viewers, or else camera 0");
-  command
-      ->add_option("--composite", options->composite,
-                   "What composites draw: full (whole parts) or rest (only what light cannot show)")
-      ->check(CLI::IsMember({"full", "rest"}))
-      ->capture_default_str();
+  add_choice(command, "--composite", &options->composite, k_composites,
+             "What composites draw: full (whole parts) or rest (only what light cannot show)");
   command->add_flag("--undistorted", options->undistorted,
                     "Remove the lens distortion of the cameras from the composites");
-  command
-      ->add_option("--contact-shadow", options->contact_shadow,
-                   "on: parts darken the prototype around them in composites and view.png; off: pixels "
-                   "beside parts keep their values")
-      ->check(CLI::IsMember({"on", "off"}))
-      ->capture_default_str();
-  command
-      ->add_option("--marker-light", options->marker_light,
-                   "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)")
-      ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
-      ->capture_default_str();
+  add_choice(command, "--contact-shadow", &options->contact_shadow, k_off_on,
+             "on: parts darken the prototype around them in composites and view.png; off: pixels beside "
+             "parts keep their values");
+  add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
+             "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
   command->add_option(
       "--view", options->view,
       "Viewer file of a virtual camera; writes view.png with prototype and parts as it sees them");
   command->add_option(
       "--stereo", options->stereo_mm,
       "With --view: distance between two virtual cameras in mm; view.png shows their images side by side");
-  command
-      ->add_option("--compensation", options->light.compensation,
-                   "What the projected light compensates for: none; geometry (distance, incidence, "
-                   "vignetting and the scene's albedo); measured (albedo, colours, ambient and black light "
-                   "as measured by the rig's response images)")
-      ->check(CLI::IsMember({"none", "geometry", "measured"}))
-      ->capture_default_str();
+  add_choice(command, "--compensation", &options->light.compensation, k_compensations,
+             "What the projected light compensates for: none; geometry (distance, incidence, vignetting and "
+             "the scene's albedo); measured (albedo, colours, ambient and black light as measured by the "
+             "rig's response images)");
   command->add_option(
       "--measured-at", options->light.measured_at,
       "POSES.json with the prototype's pose in the response images; without it, the pose where it is drawn");
@@ -502,12 +515,9 @@ void add_render(CLI::App& app, Run& run) {
       "--level", options->light.level,
       "With compensation: brightness of white as an irradiance, where 1 is a projector's white at 1 m "
       "distance and normal incidence; without it, the level that four fifths of the prototype can reach");
-  command
-      ->add_option(
-          "--black", options->light.black,
-          "Black light of the projectors: as-is, or even (overlaps of projectors do not show in the dark)")
-      ->check(CLI::IsMember({"as-is", "even"}))
-      ->capture_default_str();
+  add_choice(
+      command, "--black", &options->light.even_black, k_blacks,
+      "Black light of the projectors: as-is, or even (overlaps of projectors do not show in the dark)");
   command->add_option("--out", options->out, "Folder for the images and coverage.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });
 }
@@ -552,20 +562,16 @@ void add_export(CLI::App& app, Run& run) {
       "poses.json");
   auto options = std::make_shared<ExportOptions>();
   command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write");
-  command
-      ->add_option("--profile", options->profile,
-                   "MPCDI profile: sl (shader lamps), a3 (advanced 3D) or 3d (one viewer)")
-      ->check(CLI::IsMember({"sl", "a3", "3d"}))
-      ->capture_default_str();
+  add_choice(command, "--profile", &options->profile, k_written_mpcdi_profiles,
+             "MPCDI profile: sl (shader lamps), a3 (advanced 3D) or 3d (one viewer)");
   command->add_option("--gamma", options->gamma, "Gamma of the alpha maps (gammaEmbedded); 1 is linear")
       ->capture_default_str();
   command->add_option("--bits", options->bits, "Bits of the alpha and beta maps, 8 or 16")
       ->capture_default_str();
   command->add_option("--warp", options->warp,
                       "Folder for warp-PROJECTOR.pfm or .exr, the points that the pixels light");
-  command->add_option("--format", options->format, "File format of --warp: pfm or exr (R, G, B are x, y, z)")
-      ->check(CLI::IsMember({"pfm", "exr"}))
-      ->capture_default_str();
+  add_choice(command, "--format", &options->format, k_warp_formats,
+             "File format of --warp: pfm or exr (R, G, B are x, y, z)");
   command->add_option("--looks", options->looks,
                       "Folder for look-SLOT-VARIANT.png, each variant as the viewer sees it");
   command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")
@@ -639,16 +645,10 @@ void add_live(CLI::App& app, Run& run) {
                       "Folder for poses.csv, telemetry.csv, session.html and the last images");
   command->add_flag("--window", options->window,
                     "Open the operator's window: images, devices, parts, looks, telemetry, keys");
-  command
-      ->add_option("--prediction", options->prediction,
-                   "How poses are predicted for the moment when the light is shown: hold, linear or filtered")
-      ->check(CLI::IsMember({"hold", "linear", "filtered"}))
-      ->capture_default_str();
-  command
-      ->add_option("--marker-light", options->marker_light,
-                   "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)")
-      ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
-      ->capture_default_str();
+  add_choice(command, "--prediction", &options->prediction, tracker::k_predictions,
+             "How poses are predicted for the moment when the light is shown: hold, linear or filtered");
+  add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
+             "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
   command->add_option("--osc", options->osc,
                       "PORT or ADDRESS:PORT at which OSC messages of other programs are received; a port "
                       "alone accepts this machine only");
