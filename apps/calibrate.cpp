@@ -111,7 +111,7 @@ std::optional<GuiWindow> window_for(const CalibrateOptions& options, const Resul
 Status played(const CalibrateOptions& options,
               const std::string& plan_json,
               const WizardPlan& plan,
-              const Surroundings& around,
+              const WizardBackend& backend,
               std::optional<GuiWindow> window,
               std::atomic<WizardWish>* wish,
               MainThreadExecutor* executor) {
@@ -120,13 +120,13 @@ Status played(const CalibrateOptions& options,
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const WizardWork work = [&](const Surroundings& where, const WizardAudience& audience) {
+  const WizardWork work = [&](const WizardBackend& where, const WizardListener& listener) {
     return calibrated({options.out, options.scene, options.scan, options.all}, plan_json, plan.captures,
-                      plan.places, where, audience);
+                      plan.places, where, listener);
   };
   LIMN_TRY(const Calibrated done,
-           window ? calibrated_in_window(&*window, plan, around, say, wish, executor, work)
-                  : work(around, {.say = say}));
+           window ? calibrated_in_window(&*window, plan, backend, say, wish, executor, work)
+                  : work(backend, {.say = say}));
   say_end(options, done, say);
   if (options.json) fmt::print("{}", to_json(done));
   return {};
@@ -204,12 +204,12 @@ Status calibrate_on(const CalibrateOptions& options,
   if (window)
     for (auto& display : devices.projectors)
       display = std::make_unique<ErrandDisplay>(std::move(display), &executor);
-  DeviceBackend stage(std::move(devices), *board, &wish);
+  DeviceBackend device_backend(std::move(devices), *board, &wish);
   ImageWriter writer;
   return played(options, captured_plan(options.board, options.code, captures),
                 {captures, pose_instructions(assumed, *board, poses), targets, devices_in_words(captures, ""),
                  targets_by},
-                stage.surroundings(&writer), std::move(window), &wish, &executor);
+                device_backend.backend(&writer), std::move(window), &wish, &executor);
 }
 
 Status run_calibrate(const CalibrateOptions& options) {

@@ -154,7 +154,7 @@ Result<Rate> measured(device::CameraSource& camera) {
   return rate;
 }
 
-std::string shown(const device::CameraSetting& setting) {
+std::string setting_text(const device::CameraSetting& setting) {
   if (!setting.found) return fmt::format(", {} requested {:g}", to_text(setting.name), setting.asked);
   return fmt::format(", {} {:g} (requested {:g})", to_text(setting.name), *setting.found, setting.asked);
 }
@@ -170,7 +170,7 @@ Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   if (rate->per_second > 0) text += fmt::format(", {:.1f} frames per second", rate->per_second);
   std::string problems;
   for (const device::CameraSetting& setting : (*camera)->settings()) {
-    text += shown(setting);
+    text += setting_text(setting);
     if (!setting.problem.empty())
       problems += fmt::format("{}{}", problems.empty() ? "" : " ", setting.problem);
   }

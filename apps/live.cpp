@@ -168,7 +168,7 @@ Status played(const LiveOptions& options,
   LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(const std::unique_ptr<remote::Server> server, served(options, setup));
   LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
-  tell(skipped_variants, {}, &output.telemetry());
+  report_skipped(skipped_variants, {}, &output.telemetry());
   LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
   session.survive_losses(drawing_in(&context));

@@ -61,7 +61,7 @@ Status captured_by_devices(const RecheckCommand& command, const fs::path& folder
                            board, calib::PatternCode::gray, {.inverses = false});
   DeviceBackend stage(std::move(devices), board, nullptr);
   ImageWriter writer;
-  return captured_once(captures, rig, stage.surroundings(&writer));
+  return captured_once(captures, rig, stage.backend(&writer));
 }
 
 // The captures folder that the command names, or that it captures now.

@@ -99,8 +99,8 @@ class Recording final : public FrameClock, public FrameSource {
       LIMN_TRY_STATUS(watch(*unwatched_.front()));
       unwatched_.pop_front();
     }
-    out.watched = perception_->watched();
-    out.watched->uses.clear();  // their effects were recorded as edits
+    out.percepts = perception_->percepts();
+    out.percepts->uses.clear();  // their effects were recorded as edits
     out.moments = moments_;
     return out;
   } catch (const nlohmann::json::exception& problem) {
@@ -153,10 +153,10 @@ class Recording final : public FrameClock, public FrameSource {
 
   Status apply(const Json& event) {
     if (event.contains("watch")) unwatched_.push_back(&event.at("watch"));
-    if (event.contains("scene")) return show(event.at("scene"));
-    if (event.contains("rig")) return mend(event.at("rig"));
+    if (event.contains("scene")) return replace_scene(event.at("scene"));
+    if (event.contains("rig")) return replace_rig(event.at("rig"));
     if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
-    if (event.contains("eye")) see(event.at("eye"));
+    if (event.contains("eye")) replay_tablet(event.at("eye"));
     return {};
   }
 
@@ -167,34 +167,34 @@ class Recording final : public FrameClock, public FrameSource {
                  folder);
   }
 
-  Status mend(const std::string& folder) {
+  Status replace_rig(const std::string& folder) {
     LIMN_TRY(const fs::path path, inside(folder));
     LIMN_TRY(Rig rig, load_rig(path));
-    LIMN_TRY_STATUS(session_->mend(std::move(rig), session_->watched().captured_at));
+    LIMN_TRY_STATUS(session_->replace_rig(std::move(rig), session_->percepts().captured_at));
     const SessionSetup& setup = session_->setup();
     LIMN_TRY(*perception_, Perception::create(setup.scene, setup.rig, setup.watch));
     return {};
   }
 
-  Status show(const std::string& folder) {
+  Status replace_scene(const std::string& folder) {
     LIMN_TRY(const fs::path path, inside(folder));
     std::vector<scene::SkippedVariant> skipped_variants;  // the session left them out, too
     LIMN_TRY(scene::Scene scene, scene::load_scene(path, &skipped_variants));
-    return session_->show(std::move(scene), session_->watched().captured_at);
+    return session_->replace_scene(std::move(scene), session_->percepts().captured_at);
   }
 
   Status edit(const Json& json, const std::string& source) {
     const scene::Edit edit{json.at("action"), json.at("slot"), json.at("value")};
-    return session_->edit(edit, source, session_->watched().captured_at);
+    return session_->edit(edit, source, session_->percepts().captured_at);
   }
 
-  void see(const Json& eye) {
+  void replay_tablet(const Json& eye) {
     std::optional<Eigen::Vector3d> p_world;
     if (eye.contains("p_world")) {
       const Json& p = eye.at("p_world");
       p_world = {p.at(0).get<double>(), p.at(1).get<double>(), p.at(2).get<double>()};
     }
-    session_->see(eye.at("guest"), p_world, stamp_of(eye.at("at_ns")));
+    session_->note_tablet(eye.at("guest"), p_world, stamp_of(eye.at("at_ns")));
   }
 
   void wait_for(Stamp shown_at) {

@@ -25,7 +25,7 @@ void WorkerThread::close() {
   if (thread_.joinable()) thread_.join();
 }
 
-bool WorkerThread::take(std::function<void()> job) {
+bool WorkerThread::add_job(std::function<void()> job) {
   {
     const std::lock_guard lock(mutex_);
     if (is_closing_ || jobs_.size() >= k_most_jobs) return false;

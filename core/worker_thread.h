@@ -21,7 +21,7 @@ class WorkerThread {
 
   /// Queues a job. False: too many jobs wait, or close() was called; the job is dropped. A job must not
   /// throw.
-  bool take(std::function<void()> job);
+  bool add_job(std::function<void()> job);
   /// Drops the jobs that have not begun, waits for a running one, and accepts no more.
   void close();
 

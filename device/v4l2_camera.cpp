@@ -126,7 +126,7 @@ Result<std::uint32_t> chosen_format(const Device& device, bool grey) {
                list.empty() ? " none" : list);
 }
 
-std::string shown(const v4l2_pix_format& format) {
+std::string format_text(const v4l2_pix_format& format) {
   return fmt::format("{} {}x{}", fourcc(format.pixelformat), format.width, format.height);
 }
 
@@ -152,12 +152,12 @@ Result<v4l2_pix_format> set_format(const Device& device, std::uint32_t pixel_for
   if (const int problem = device.ask(VIDIOC_S_FMT, &format)) return refused("setting its format", problem);
   if (!same(asked, pixels))
     return error("expected the format {}, the driver offers {}. Use a size that the camera supports.",
-                 shown(asked), shown(pixels));
+                 format_text(asked), format_text(pixels));
   if (const int problem = device.ask(VIDIOC_G_FMT, &format))
     return refused("reading its format back", problem);
   if (!same(asked, pixels))
     return error("the driver took {}, then says {}. It cannot be trusted: use another camera or kernel.",
-                 shown(asked), shown(pixels));
+                 format_text(asked), format_text(pixels));
   return pixels;
 }
 
@@ -271,7 +271,7 @@ Result<Buffers> started(const Device& device, const v4l2_pix_format& format) {
       return refused("asking for a buffer", problem);
     if (buffer.length < least_bytes(format))
       return error("expected buffers of at least {} bytes for {}, the driver gives {}. Use another size.",
-                   least_bytes(format), shown(format), buffer.length);
+                   least_bytes(format), format_text(format), buffer.length);
     void* memory = device.system().map(device.fd(), buffer.length, static_cast<long>(buffer.m.offset));
     if (!memory) return refused("mapping a buffer", errno);
     buffers.add(memory, buffer.length);
@@ -317,8 +317,8 @@ cv::Mat from_yuyv(const cv::Mat& yuyv, bool grey) {
 Result<Frame> decoded(const Buffers::Map& map, std::size_t bytes, const v4l2_pix_format& format, bool grey) {
   const cv::Size size(static_cast<int>(format.width), static_cast<int>(format.height));
   if (bytes > map.size || bytes < least_bytes(format))
-    return error("expected a frame of at least {} bytes ({}), found {}.", least_bytes(format), shown(format),
-                 bytes);
+    return error("expected a frame of at least {} bytes ({}), found {}.", least_bytes(format),
+                 format_text(format), bytes);
   if (format.pixelformat == V4L2_PIX_FMT_MJPEG)
     return decode_frame({reinterpret_cast<const char*>(map.data), bytes}, {.grey = grey, .size = size});
   const bool yuyv = format.pixelformat == V4L2_PIX_FMT_YUYV;
@@ -520,7 +520,7 @@ cv::Size V4l2Camera::size() const { return impl_->size; }
 Result<Frame> V4l2Camera::next() { return impl_->next(); }
 
 std::string V4l2Camera::description() const {
-  const std::string format = impl_->session ? shown(impl_->session->format) : "lost";
+  const std::string format = impl_->session ? format_text(impl_->session->format) : "lost";
   return fmt::format(
       "V4L2, {}; opened {} times, {} frames skipped for newer ones, {} damaged, {} with an impossible stamp",
       format, impl_->openings, impl_->dropped, impl_->damaged, impl_->odd_stamps);

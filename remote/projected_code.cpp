@@ -27,7 +27,7 @@ std::optional<apps::OverlayPlace> free_place(apps::Session* session,
   if (points.empty() || shape.empty()) return std::nullopt;
   const Rig& rig = session->setup().rig;
   const Imager& imager = rig.projectors[projector];
-  const Pose& world_from_prototype = *session->painted().posed.world_from_prototype;
+  const Pose& world_from_prototype = *session->composed().posed.world_from_prototype;
   const Eigen::Vector3d d_up_world =
       (rig.cameras.empty() ? imager : rig.cameras[0]).imager_from_world.rotation.inverse() *
       Eigen::Vector3d(0, -1, 0);
@@ -36,7 +36,7 @@ std::optional<apps::OverlayPlace> free_place(apps::Session* session,
                          world_from_prototype.rotation.inverse() * d_up_world, shape, least_px);
   };
   cv::Mat parts, free = points.clone();
-  cv::cvtColor(session->painted().projectors[projector], parts, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(session->composed().projectors[projector], parts, cv::COLOR_BGR2GRAY);
   free.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()), parts > k_dark);
   const auto beside = place(free);
   return beside ? beside : place(points);

@@ -147,7 +147,8 @@ void Server::apply_edits(apps::Session* session, Stamp at) {
     const std::lock_guard lock(mutex_);
     viewpoints.swap(viewpoints_);
   }
-  for (const auto& [guest, p_viewpoint_world] : viewpoints) session->see(guest, p_viewpoint_world, at);
+  for (const auto& [guest, p_viewpoint_world] : viewpoints)
+    session->note_tablet(guest, p_viewpoint_world, at);
   for (std::size_t i = 0; i < k_max_edits_at_once && Clock::now() - begun < k_edit_time_budget; ++i) {
     const auto request = next_edit_request();
     if (!request) break;
@@ -157,7 +158,7 @@ void Server::apply_edits(apps::Session* session, Stamp at) {
   }
 }
 
-void Server::hear(const apps::SessionMoment& moment) {
+void Server::apply_edits(const apps::SessionMoment& moment) {
   apply_edits(&moment.session, moment.at);
   publish_state(moment.session, moment.telemetry, moment.health, moment.at);
 }
@@ -193,7 +194,7 @@ void Server::publish_state(const apps::Session& session,
     scene_ = std::make_shared<const scene::Scene>(session.setup().scene);
     scenes_ = session.scenes();
   }
-  hand_over_news({session_state(session, telemetry, health, *begun_at_), session.painted().projectors,
+  hand_over_news({session_state(session, telemetry, health, *begun_at_), session.composed().projectors,
                   session.show_state().looks, scene_, std::exchange(edit_results_, {})});
 }
 

@@ -57,8 +57,8 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
 
   /// Both apply edits and publish the state, so that an edit that comes while a frame is made need not wait
   /// for the next one.
-  void hear(const apps::SessionMoment& moment) override;
-  void tell(const apps::SessionMoment& moment) override { hear(moment); }
+  void apply_edits(const apps::SessionMoment& moment) override;
+  void publish_state(const apps::SessionMoment& moment) override { apply_edits(moment); }
   std::vector<apps::Overlay> overlays(apps::Session* session) override;
 
   /// Has a projector show the code that pairs for a role, from its next image on and for

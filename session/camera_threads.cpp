@@ -50,8 +50,8 @@ void CameraThreads::add(std::unique_ptr<device::CameraSource> camera, std::size_
   running_.push_back(std::move(running));
 }
 
-std::optional<Frames> CameraThreads::take(std::chrono::nanoseconds wait) {
-  return shared_->frames.take(wait);
+std::optional<Frames> CameraThreads::take_frames(std::chrono::nanoseconds wait) {
+  return shared_->frames.take_newest(wait);
 }
 
 std::size_t CameraThreads::missed() { return shared_->missed.exchange(0); }

@@ -34,7 +34,7 @@ class CameraThreads {
   void add(std::unique_ptr<device::CameraSource> camera, std::size_t number);
 
   /// The newest frames that were not taken yet; waits up to `wait` for one.
-  std::optional<Frames> take(std::chrono::nanoseconds wait);
+  std::optional<Frames> take_frames(std::chrono::nanoseconds wait);
   /// Number of frames that were dropped since the last call.
   std::size_t missed();
 

@@ -30,28 +30,30 @@ DeviceCapture::DeviceCapture(SessionDevices* devices,
       projector_names_(device_names(rig.projectors)),
       is_ended_(is_ended) {}
 
-Surroundings DeviceCapture::surroundings(ImageWriter* writer) {
+WizardBackend DeviceCapture::backend(ImageWriter* writer) {
   grabbed_.clear();
   latency_s_.assign(devices_->projectors.size(), FlashOptions().limit_s);
-  Surroundings around;
-  around.stage.show = [this](int projector, const cv::Mat& image) {
+  WizardBackend backend;
+  backend.capture.show = [this](int projector, const cv::Mat& image) {
     return show_pattern(static_cast<std::size_t>(projector), image);
   };
-  around.stage.grab = [this](int camera) { return grab(camera_names_.at(static_cast<std::size_t>(camera))); };
-  around.stage.store = [writer](const std::filesystem::path& path, const cv::Mat& image) {
+  backend.capture.grab = [this](int camera) {
+    return grab(camera_names_.at(static_cast<std::size_t>(camera)));
+  };
+  backend.capture.store = [writer](const std::filesystem::path& path, const cv::Mat& image) {
     return writer->store(path, image);
   };
-  around.written = [writer] { return writer->finish(); };
-  around.use_latency = [this](int projector, double seconds) {
+  backend.wait_for_files = [writer] { return writer->finish(); };
+  backend.use_latency = [this](int projector, double seconds) {
     latency_s_.at(static_cast<std::size_t>(projector)) = seconds;
   };
-  return around;
+  return backend;
 }
 
 void DeviceCapture::pause_perception(Session* session) {
   perception_->stop();
-  if (Perceived last = perception_->take({}); last.watched)
-    session->take(std::move(*last.watched), last.moments);
+  if (Perceived last = perception_->take_percepts({}); last.percepts)
+    session->update_percepts(std::move(*last.percepts), last.moments);
 }
 
 // Shows an image on one projector, and black on the others.
@@ -74,7 +76,7 @@ Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) 
 Result<cv::Mat> DeviceCapture::grab(const std::string& camera) {
   const Stamp begun = now();
   for (;;) {
-    auto newest = cameras_->take(k_grab_wait);
+    auto newest = cameras_->take_frames(k_grab_wait);
     if (newest)
       for (auto& [name, frame] : *newest) {
         const auto [known, is_first] = grabbed_.try_emplace(name, Grabbed{{}, k_longest_exposure_s});

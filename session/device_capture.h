@@ -24,7 +24,7 @@ class DeviceCapture final : public CaptureDevices {
                 const Rig& rig,
                 const std::atomic<bool>& is_ended);
 
-  Surroundings surroundings(ImageWriter* writer) override;
+  WizardBackend backend(ImageWriter* writer) override;
   void pause_perception(Session* session) override;
   void resume_perception() override { perception_->start(); }
   bool waits_for_result() const override { return false; }

@@ -44,7 +44,7 @@ class DeviceSource final : public FrameSource {
 
   bool is_over() const override { return seconds_ > 0 && seconds_between(begun_, now()) >= seconds_; }
   Result<Perceived> perceive() override {
-    Perceived out = perception_->take(k_wait);
+    Perceived out = perception_->take_percepts(k_wait);
     out.missed = static_cast<int>(cameras_->missed());
     return out;
   }

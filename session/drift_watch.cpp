@@ -51,9 +51,10 @@ std::string sentence(const Drift& drift) {
 }
 
 std::optional<std::string> DriftNotices::news(const std::optional<Drift>& drift) {
-  const bool is_news = drift.has_value() != told_.has_value() || (drift && drift->devices != told_->devices);
+  const bool is_news =
+      drift.has_value() != reported_.has_value() || (drift && drift->devices != reported_->devices);
   if (!is_news) return std::nullopt;
-  told_ = drift;
+  reported_ = drift;
   return drift ? sentence(*drift) : "All devices are back in their calibrated position.";
 }
 
@@ -61,12 +62,12 @@ DriftWatch::DriftWatch(const Rig& rig) : rig_(rig) {
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) lights_.emplace_back(rig, i);
 }
 
-void DriftWatch::look(const Percepts& watched,
-                      const scene::PosedScene& posed,
-                      const ProjectionHistory& shown,
-                      projector::Renderer* renderer) {
+void DriftWatch::compare(const Percepts& percepts,
+                         const scene::PosedScene& posed,
+                         const ProjectionHistory& shown,
+                         projector::Renderer* renderer) {
   if (!posed.world_from_prototype || lights_.empty()) return;
-  const Stamp at = watched.captured_at;
+  const Stamp at = percepts.captured_at;
   if (!rests_ || is_elsewhere(*rests_, *posed.world_from_prototype)) {
     rests_ = posed.world_from_prototype;
     rests_since_ = at;
@@ -87,12 +88,12 @@ void DriftWatch::look(const Percepts& watched,
   if (seconds_between(began_at_, at) < k_look_s) return;
   began_at_ = compared_at_ = at;
   turn_ = (turn_ + 1) % lights_.size();
-  const Frame& frame = watched.frames[turn_];
+  const Frame& frame = percepts.frames[turn_];
   if (frame.image.empty()) return;
   const auto* now = shown.at(frame.captured_at);
   const auto* before = shown.at(shifted(frame.captured_at, -k_before_s));
   if (!now || !before) return;
-  lights_[turn_].begin(frame, *now, *before, papers(watched.detections[turn_]));
+  lights_[turn_].begin(frame, *now, *before, papers(percepts.detections[turn_]));
 }
 
 // Finds the device whose motion explains best what all cameras see; nullopt if no motion explains it better

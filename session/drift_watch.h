@@ -33,12 +33,12 @@ class DriftNotices {
   /// nullopt.
   std::optional<std::string> news(const std::optional<Drift>& drift);
   /// The drift that was last reported.
-  const std::optional<Drift>& told() const { return told_; }
+  const std::optional<Drift>& reported() const { return reported_; }
   /// To be called when the rig is replaced: nothing has been reported about the new one yet.
-  void forget() { told_.reset(); }
+  void forget() { reported_.reset(); }
 
  private:
-  std::optional<Drift> told_;
+  std::optional<Drift> reported_;
 };
 
 /// Detects from the projected light whether cameras and projectors are still at their calibrated poses: it
@@ -49,10 +49,10 @@ class DriftWatch {
  public:
   explicit DriftWatch(const Rig& rig);
 
-  void look(const Percepts& watched,
-            const scene::PosedScene& posed,
-            const ProjectionHistory& shown,
-            projector::Renderer* renderer);
+  void compare(const Percepts& percepts,
+               const scene::PosedScene& posed,
+               const ProjectionHistory& shown,
+               projector::Renderer* renderer);
 
   /// The moved device. It is set after it was found for some seconds (k_holds_s), and cleared after the
   /// device was back in place for as long.

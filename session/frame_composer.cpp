@@ -24,27 +24,27 @@ Eigen::AlignedBox3d box_of(const scene::Scene& scene) {
 
 }  // namespace
 
-std::vector<cv::Mat> with_overlays(const ComposedFrame& painted,
+std::vector<cv::Mat> with_overlays(const ComposedFrame& composed,
                                    const Rig& rig,
                                    std::span<const Overlay> overlays) {
-  std::vector<cv::Mat> out = painted.projectors;
+  std::vector<cv::Mat> out = composed.projectors;
   if (overlays.empty()) return out;
   for (std::size_t i = 0; i < out.size(); ++i) {
     out[i] = out[i].clone();
-    draw(overlays, {i, rig.projectors[i], painted.posed, &out[i]});
+    draw(overlays, {i, rig.projectors[i], composed.posed, &out[i]});
   }
   return out;
 }
 
 std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
                                          const scene::ShowState& show_state,
-                                         const Percepts& watched) {
+                                         const Percepts& percepts) {
   std::vector<LooseMarker> waiting;
-  for (const LooseMarker& loose : watched.loose) {
+  for (const LooseMarker& loose : percepts.loose) {
     bool carries = false;
     for (std::size_t i = 0; i < scene.slots.size(); ++i)
       carries |= scene::slot_marker(scene, show_state, i) == loose.marker;
-    if (!carries && seconds_between(loose.still_since, watched.captured_at) >= k_lies_after_s)
+    if (!carries && seconds_between(loose.still_since, percepts.captured_at) >= k_lies_after_s)
       waiting.push_back(loose);
   }
   return waiting;
@@ -72,55 +72,55 @@ FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
       drifts_(subject_->rig) {
   renderer_.set_quick_motion(true);
   for (const Imager& projector : subject_->rig.projectors)
-    painted_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
+    composed_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
 }
 
 const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
-  painted_.painted_at = input.times.now;
-  painted_.shown_at = input.times.shown_at;
+  composed_.painted_at = input.times.now;
+  composed_.shown_at = input.times.shown_at;
   const scene::ShowState& show_state = input.show_state;
-  if (show_state.frozen && !show_state.blackout && !is_black_) return painted_;
+  if (show_state.frozen && !show_state.blackout && !is_black_) return composed_;
   is_black_ = show_state.blackout;
 
   // Compose: poses of the parts, fades, viewpoint, shadows on the prototype.
-  painted_.tracks = input.tracks;
-  keep_still(fading_.shown().world_from_prototype, prototype_box_, &painted_.tracks);
-  painted_.posed = scene::compose_scene(subject_->scene, show_state, painted_.tracks);
-  fading_.note(subject_->scene, painted_.posed, show_state, input.times.shown_at);
+  composed_.tracks = input.tracks;
+  keep_still(fading_.faded().world_from_prototype, prototype_box_, &composed_.tracks);
+  composed_.posed = scene::compose_scene(subject_->scene, show_state, composed_.tracks);
+  fading_.note(subject_->scene, composed_.posed, show_state, input.times.shown_at);
   select_viewpoint(input);
   if (options_.refill && subject_->rig.projectors.size() > 1)
-    shadows_.look(input.watched, painted_.posed, shown_, &renderer_);
+    shadows_.update(input.percepts, composed_.posed, shown_, &renderer_);
 
   // Draw: parts, overlays on the surface, no light on markers, signs beside markers.
   const std::vector<Overlay> on_surface = surface_overlays(show_state);
-  for (std::size_t i = 0; i < painted_.projectors.size(); ++i) {
-    cv::Mat& image = painted_.projectors[i];
+  for (std::size_t i = 0; i < composed_.projectors.size(); ++i) {
+    cv::Mat& image = composed_.projectors[i];
     image = show_state.blackout ? cv::Mat::zeros(image.size(), image.type()) : drawn(i, on_surface);
   }
   if (!show_state.blackout) {
     keep_off_markers(input);
     const std::vector<Overlay> signs = marker_overlays(input);
-    for (std::size_t i = 0; i < painted_.projectors.size(); ++i)
-      draw(signs, target(i, &painted_.projectors[i]));
+    for (std::size_t i = 0; i < composed_.projectors.size(); ++i)
+      draw(signs, target(i, &composed_.projectors[i]));
   }
-  shown_.add(painted_.projectors, input.times.shown_at);
-  return painted_;
+  shown_.add(composed_.projectors, input.times.shown_at);
+  return composed_;
 }
 
 void FrameComposer::select_viewpoint(const FrameInput& input) {
-  const SelectedViewpoint& selected = viewpoints_.select(painted_.posed, input);
-  painted_.viewer = selected.viewer;
-  painted_.follows = selected.follows;
-  painted_.p_guest_eye_world = selected.p_guest_eye_world;
+  const SelectedViewpoint& selected = viewpoints_.select(composed_.posed, input);
+  composed_.viewer = selected.viewer;
+  composed_.follows = selected.follows;
+  composed_.p_guest_eye_world = selected.p_guest_eye_world;
 }
 
 OverlayTarget FrameComposer::target(std::size_t projector, cv::Mat* image) {
-  return {projector,       subject_->rig.projectors[projector], painted_.posed, image, &renderer_,
-          &painted_.viewer};
+  return {projector,        subject_->rig.projectors[projector], composed_.posed, image, &renderer_,
+          &composed_.viewer};
 }
 
 cv::Mat FrameComposer::drawn(std::size_t projector, std::span<const Overlay> on_surface) {
-  cv::Mat image = fading_.image(projector, painted_.viewer, painted_.shown_at, &renderer_);
+  cv::Mat image = fading_.image(projector, composed_.viewer, composed_.shown_at, &renderer_);
   draw(on_surface, target(projector, &image));
   return image;
 }
@@ -128,21 +128,22 @@ cv::Mat FrameComposer::drawn(std::size_t projector, std::span<const Overlay> on_
 void FrameComposer::keep_off_markers(const FrameInput& input) {
   if (options_.marker_light == tracker::MarkerLight::as_is) return;
   std::vector<Body> bodies = bodies_;
-  for (const LooseMarker& loose : input.watched.loose)
+  for (const LooseMarker& loose : input.percepts.loose)
     bodies.push_back(
         {scene::loose_body(loose.marker), {{loose.marker, loose_size_m(subject_->scene), Pose()}}});
-  for (std::size_t i = 0; i < painted_.projectors.size(); ++i) {
-    const cv::Mat mask = tracker::marker_mask(subject_->rig.projectors[i], bodies, painted_.tracks);
-    painted_.projectors[i] = tracker::with_marker_light(painted_.projectors[i], mask, options_.marker_light);
+  for (std::size_t i = 0; i < composed_.projectors.size(); ++i) {
+    const cv::Mat mask = tracker::marker_mask(subject_->rig.projectors[i], bodies, composed_.tracks);
+    composed_.projectors[i] =
+        tracker::with_marker_light(composed_.projectors[i], mask, options_.marker_light);
   }
 }
 
 // The split view (another look left of a line) and the grid.
 std::vector<Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
   std::vector<Overlay> out;
-  if (!painted_.posed.world_from_prototype || show_state.blackout) return out;
+  if (!composed_.posed.world_from_prototype || show_state.blackout) return out;
   if (const auto left = scene::left_of_split(subject_->scene, show_state))
-    out.push_back(SplitOverlay{scene::compose_scene(subject_->scene, *left, painted_.tracks),
+    out.push_back(SplitOverlay{scene::compose_scene(subject_->scene, *left, composed_.tracks),
                                prototype_box_.center().x() + 1e-3 * show_state.split_mm});
   if (show_state.grid) out.push_back(GridOverlay{});
   return out;
@@ -152,8 +153,8 @@ std::vector<Overlay> FrameComposer::surface_overlays(const scene::ShowState& sho
 // variants.
 std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) const {
   std::vector<Overlay> out;
-  const Stamp at = painted_.shown_at;
-  for (const Track& track : painted_.tracks) {
+  const Stamp at = composed_.shown_at;
+  for (const Track& track : composed_.tracks) {
     const auto body =
         std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& b) { return b.name == track.body; });
     if (body == bodies_.end()) continue;
@@ -178,7 +179,7 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
       }
     }
   }
-  const std::vector<LooseMarker> waiting = waiting_markers(subject_->scene, input.show_state, input.watched);
+  const std::vector<LooseMarker> waiting = waiting_markers(subject_->scene, input.show_state, input.percepts);
   for (const LooseMarker& loose : waiting) {
     const double share = &loose == &waiting.back() ? 1 : k_other_waiting;
     if (const auto projector = best_projector(loose.world_from_marker))
@@ -202,25 +203,25 @@ std::optional<std::size_t> FrameComposer::best_projector(const Pose& world_from_
   return best;
 }
 
-void FrameComposer::look_for_drift(const Percepts& watched) {
-  drifts_.look(watched, painted_.posed, shown_, &renderer_);
+void FrameComposer::check_drift(const Percepts& percepts) {
+  drifts_.compare(percepts, composed_.posed, shown_, &renderer_);
 }
 
-cv::Mat FrameComposer::screen(const Percepts& watched,
+cv::Mat FrameComposer::screen(const Percepts& percepts,
                               std::span<const Track> tracks,
                               const scene::ShowState& show_state,
                               scene::Screen what) {
-  if (watched.frames.empty()) return {};
-  ScreenInput input{watched.frames[0], show_state, scene::assign_tracks(subject_->scene, show_state, tracks),
+  if (percepts.frames.empty()) return {};
+  ScreenInput input{percepts.frames[0], show_state, scene::assign_tracks(subject_->scene, show_state, tracks),
                     viewpoints_.selected().viewer};
-  keep_still(fading_.shown().world_from_prototype, prototype_box_, &input.tracks);
+  keep_still(fading_.faded().world_from_prototype, prototype_box_, &input.tracks);
   return screens_.image(input, what, &renderer_);
 }
 
 cv::Mat FrameComposer::free_surface(std::size_t projector) {
-  cv::Mat points = renderer_.surface_points(projector, painted_.posed);
+  cv::Mat points = renderer_.surface_points(projector, composed_.posed);
   points.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
-               tracker::marker_mask(subject_->rig.projectors[projector], bodies_, painted_.tracks));
+               tracker::marker_mask(subject_->rig.projectors[projector], bodies_, composed_.tracks));
   return points;
 }
 

@@ -36,8 +36,8 @@ struct ComposedFrame {
   std::optional<Eigen::Vector3d> p_guest_eye_world = {};
 };
 
-/// The composed images with overlays drawn over them. Without overlays they share the memory of `painted`.
-std::vector<cv::Mat> with_overlays(const ComposedFrame& painted,
+/// The composed images with overlays drawn over them. Without overlays they share the memory of `composed`.
+std::vector<cv::Mat> with_overlays(const ComposedFrame& composed,
                                    const Rig& rig,
                                    std::span<const Overlay> overlays);
 
@@ -45,7 +45,7 @@ std::vector<cv::Mat> with_overlays(const ComposedFrame& painted,
 /// without a marker uses the last one.
 std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
                                          const scene::ShowState& show_state,
-                                         const Percepts& watched);
+                                         const Percepts& percepts);
 
 /// The projector side of a session: motions of bodies + show state -> images for projectors and screens.
 /// Keeps the state of what fades; the same calls give the same images. A GL context must be current at every
@@ -61,11 +61,11 @@ class FrameComposer {
 
   /// Checks by the projected light whether a device has moved, with the frames that compose() used last.
   /// After the prototype has come to rest this takes longer than a frame: call it when the images are shown.
-  void look_for_drift(const Percepts& watched);
+  void check_drift(const Percepts& percepts);
 
   /// A screen's image for the newest frame of camera 0; empty before the first frame and for Screen::off.
   /// `tracks`: Prediction::at_image.
-  cv::Mat screen(const Percepts& watched,
+  cv::Mat screen(const Percepts& percepts,
                  std::span<const Track> tracks,
                  const scene::ShowState& show_state,
                  scene::Screen what);
@@ -75,7 +75,7 @@ class FrameComposer {
   cv::Mat free_surface(std::size_t projector);
 
   /// The last composed frame.
-  const ComposedFrame& painted() const { return painted_; }
+  const ComposedFrame& composed() const { return composed_; }
   /// The device that has moved, if any.
   const std::optional<Drift>& drift() const { return drifts_.drift(); }
 
@@ -107,7 +107,7 @@ class FrameComposer {
   ProjectionHistory shown_;
   ShadowWatch shadows_;
   DriftWatch drifts_;
-  ComposedFrame painted_;
+  ComposedFrame composed_;
   bool is_black_ = false;  // in a blackout, which has priority over a freeze
 };
 

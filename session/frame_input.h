@@ -54,15 +54,15 @@ struct Prediction {
 };
 
 /// The predictions that need only percepts: at_capture and at_image.
-Prediction predicted_at_capture(const Percepts& watched, const ComposeOptions& options);
+Prediction predicted_at_capture(const Percepts& percepts, const ComposeOptions& options);
 /// Prediction::at_light.
-std::vector<Track> predicted_at_light(const Percepts& watched,
+std::vector<Track> predicted_at_light(const Percepts& percepts,
                                       const ComposeOptions& options,
                                       const FrameTimes& times);
 
 /// The input for composing one frame. Borrows what it refers to.
 struct FrameInput {
-  const Percepts& watched;
+  const Percepts& percepts;
   const scene::ShowState& show_state;
   FrameTimes times;
   std::vector<Track> tracks;  ///< Prediction::at_light, assigned to slots as the show state pairs markers
@@ -72,7 +72,7 @@ struct FrameInput {
 /// Makes a FrameInput without a Session.
 FrameInput frame_input(const scene::Scene& scene,
                        const ComposeOptions& options,
-                       const Percepts& watched,
+                       const Percepts& percepts,
                        const scene::ShowState& show_state,
                        const FrameTimes& times);
 

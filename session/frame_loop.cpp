@@ -26,18 +26,18 @@ Result<bool> FrameLoop::step() {
   // Recalibrate, if somebody has asked for it. No frames are composed while it uses the projectors.
   recalibration_.step(setting_.clock);
   if (recalibration_.holds_light()) {
-    hear_clients();
+    apply_client_edits();
     note_devices();
-    return tell_clients(nullptr, {});
+    return publish_to_clients(nullptr, {});
   }
 
   // Perceive: markers, bodies and gestures in the cameras' newest frames.
   LIMN_TRY(Perceived perceived, setting_.source.perceive());
-  if (perceived.watched) session.take(std::move(*perceived.watched), perceived.moments);
+  if (perceived.percepts) session.update_percepts(std::move(*perceived.percepts), perceived.moments);
 
   // Edit: changes by a script, a recording, files and people.
   LIMN_TRY_STATUS(setting_.source.edit(&session));
-  hear_clients();
+  apply_client_edits();
   LIMN_TRY(const std::optional<FrameTimes> times, setting_.clock.next_frame());
   if (!times) return true;
 
@@ -45,13 +45,13 @@ Result<bool> FrameLoop::step() {
   const FrameInput input = session.predict(*times);
 
   // Compose and draw the projectors' images (FrameComposer::compose).
-  const ComposedFrame& painted = session.compose(input);
+  const ComposedFrame& composed = session.compose(input);
 
   // Add the clients' overlays to the projected light only.
-  const std::vector<cv::Mat> light = with_overlays(painted, session.setup().rig, client_overlays());
+  const std::vector<cv::Mat> light = with_overlays(composed, session.setup().rig, client_overlays());
 
   // Show: the projectors first, because people look at them.
-  LIMN_TRY_STATUS(setting_.sink.show(painted, light));
+  LIMN_TRY_STATUS(setting_.sink.show(composed, light));
   const Stamp begun = now();
   const std::map<scene::Screen, cv::Mat> screens = screen_images();
   const double screen_ms = screens.empty() ? -1 : milliseconds_since(begun);
@@ -59,9 +59,9 @@ Result<bool> FrameLoop::step() {
 
   // Monitor: has a device moved, which devices work? This comes after the frame is shown and does not delay
   // it.
-  session.look_for_drift(times->now);
+  session.check_drift(times->now);
   note_devices();
-  session.tell_unwritten(times->now);
+  session.report_unwritten(times->now);
 
   // Store.
   session.record_frame();
@@ -69,26 +69,26 @@ Result<bool> FrameLoop::step() {
   shown.screen_ms = screen_ms;
   shown.missed = perceived.missed;
   if (shown.record_ms >= 0) shown.record_ms += perceived.record_ms;
-  shown.placement_mm = setting_.sink.placement_mm(painted);
-  const bool is_anything_seen = session.watched().captured_at != Stamp{};
-  if (is_anything_seen) parts_.output.shown(shown, painted);
+  shown.placement_mm = setting_.sink.placement_mm(composed);
+  const bool is_anything_seen = session.percepts().captured_at != Stamp{};
+  if (is_anything_seen) parts_.output.add_frame(shown, composed);
 
   // Update the clients.
   const auto screen = screens.find(session.show_state().screen);
-  return tell_clients(is_anything_seen ? &shown : nullptr,
-                      screen == screens.end() ? cv::Mat() : screen->second);
+  return publish_to_clients(is_anything_seen ? &shown : nullptr,
+                            screen == screens.end() ? cv::Mat() : screen->second);
 }
 
-void FrameLoop::hear_clients() {
+void FrameLoop::apply_client_edits() {
   for (SessionClient* client : parts_.clients)
-    client->hear({parts_.session, parts_.output.telemetry(), setting_.health, setting_.clock.now()});
+    client->apply_edits({parts_.session, parts_.output.telemetry(), setting_.health, setting_.clock.now()});
 }
 
 // False: a client has ended the session.
-bool FrameLoop::tell_clients(const ShownFrame* shown, const cv::Mat& screen) {
+bool FrameLoop::publish_to_clients(const ShownFrame* shown, const cv::Mat& screen) {
   bool goes_on = true;
   for (SessionClient* client : parts_.clients) {
-    client->tell(
+    client->publish_state(
         {parts_.session, parts_.output.telemetry(), setting_.health, setting_.clock.now(), shown, screen});
     goes_on &= !client->ends_session();
   }

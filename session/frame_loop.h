@@ -38,10 +38,10 @@ class FrameClock {
 
 /// New percepts from the cameras.
 struct Perceived {
-  std::optional<Percepts> watched;  ///< nullopt: nothing is new
-  std::size_t moments = 0;          ///< number of calls of Perception::watch so far
-  int missed = 0;                   ///< camera frames that never arrived or were not processed
-  double record_ms = 0;             ///< time to pass the frames to the recording
+  std::optional<Percepts> percepts;  ///< nullopt: nothing is new
+  std::size_t moments = 0;           ///< number of calls of Perception::watch so far
+  int missed = 0;                    ///< camera frames that never arrived or were not processed
+  double record_ms = 0;              ///< time to pass the frames to the recording
 };
 
 /// Where percepts, and edits that no client sends, come from: cameras, a virtual room with its script, or a
@@ -63,7 +63,7 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// Shows `light`, one image per projector: the composed images with the clients' overlays. Error: the
   /// session cannot go on.
-  virtual Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) = 0;
+  virtual Status show(const ComposedFrame& composed, const std::vector<cv::Mat>& light) = 0;
   /// The screen images that show_screens() needs for this frame.
   virtual std::set<scene::Screen> wanted_screens() const { return {}; }
   virtual void show_screens(const std::map<scene::Screen, cv::Mat>&) {}
@@ -92,8 +92,8 @@ class FrameLoop {
   Result<bool> step();
 
  private:
-  void hear_clients();
-  bool tell_clients(const ShownFrame* shown, const cv::Mat& screen);
+  void apply_client_edits();
+  bool publish_to_clients(const ShownFrame* shown, const cv::Mat& screen);
   std::vector<Overlay> client_overlays();
   std::map<scene::Screen, cv::Mat> screen_images();
   void note_devices();

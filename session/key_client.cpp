@@ -13,7 +13,7 @@ KeyClient::KeyClient(std::vector<device::KeySource>& sources,
     sources_.push_back({&source, health->add({source.name(), "keys"})});
 }
 
-void KeyClient::hear(const SessionMoment& moment) {
+void KeyClient::apply_edits(const SessionMoment& moment) {
   for (Source& source : sources_) {
     const auto pressed = source.keys->poll_pressed_keys();
     if (static_cast<bool>(pressed) == source.is_gone)  // the source failed, or works again

@@ -18,8 +18,8 @@ class KeyClient final : public SessionClient {
             Keys* keys,
             DeviceHealth* health);
 
-  void hear(const SessionMoment& moment) override;
-  void tell(const SessionMoment&) override {}
+  void apply_edits(const SessionMoment& moment) override;
+  void publish_state(const SessionMoment&) override {}
 
  private:
   struct Source {

@@ -23,7 +23,7 @@ class Latest {
   }
 
   /// The newest value that was not taken yet; waits up to `wait` for one. nullopt: none came.
-  std::optional<T> take(std::chrono::nanoseconds wait) {
+  std::optional<T> take_newest(std::chrono::nanoseconds wait) {
     std::unique_lock lock(mutex_);
     changed_.wait_for(lock, wait, [&] { return value_.has_value(); });
     return std::exchange(value_, std::nullopt);

@@ -32,7 +32,7 @@ Status mend(const Result<Rechecked>& checked,
             Session* session) {
   if (!checked) return checked.error();
   if (checked->result.verdict != calib::RigVerdict::sound) {
-    LIMN_TRY_STATUS(session->mend(checked->result.rig, at));
+    LIMN_TRY_STATUS(session->replace_rig(checked->result.rig, at));
     const SessionSetup& setup = session->setup();
     LIMN_TRY(*perception, Perception::create(setup.scene, setup.rig, setup.watch));
   }
@@ -56,12 +56,12 @@ Result<fs::path> recalibration_folder(const fs::path& out) {
 
 LiveRecalibration::LiveRecalibration(const Rig& rig,
                                      fs::path folder,
-                                     const std::function<Surroundings(ImageWriter*)>& around)
+                                     const std::function<WizardBackend(ImageWriter*)>& backend)
     : folder_(std::move(folder)), images_(recheck_images(rig)) {
   result_ = std::async(std::launch::async,
-                       [this, rig, around = through_errands(around(&writer_))]() -> Result<Rechecked> {
+                       [this, rig, backend = through_errands(backend(&writer_))]() -> Result<Rechecked> {
                          try {
-                           return rechecked_in_place(rig, around, folder_, [this] { return !is_over_; });
+                           return rechecked_in_place(rig, backend, folder_, [this] { return !is_over_; });
                          } catch (const std::exception& bug) {
                            return error("this is a bug in Limn, please report it: {}", bug.what());
                          }
@@ -74,9 +74,9 @@ LiveRecalibration::~LiveRecalibration() {
 }
 
 // The same functions, executed by serve(). After cancellation they return errors.
-Surroundings LiveRecalibration::through_errands(Surroundings around) {
-  Surroundings out;
-  out.stage.show = [this, show = around.stage.show](int projector, const cv::Mat& image) {
+WizardBackend LiveRecalibration::through_errands(WizardBackend backend) {
+  WizardBackend out;
+  out.capture.show = [this, show = backend.capture.show](int projector, const cv::Mat& image) {
     Status status = error("{}", k_ended);
     executor_.run([&] {
       if (is_over_) return;
@@ -85,18 +85,18 @@ Surroundings LiveRecalibration::through_errands(Surroundings around) {
     });
     return status;
   };
-  out.stage.grab = [this, grab = around.stage.grab](int camera) {
+  out.capture.grab = [this, grab = backend.capture.grab](int camera) {
     Result<cv::Mat> image = error("{}", k_ended);
     executor_.run([&] {
       if (!is_over_) image = grab(camera);
     });
     return image;
   };
-  out.stage.store = around.stage.store;
-  out.use_latency = [this, use = around.use_latency](int projector, double seconds) {
+  out.capture.store = backend.capture.store;
+  out.use_latency = [this, use = backend.use_latency](int projector, double seconds) {
     executor_.run([&] { use(projector, seconds); });
   };
-  out.written = [this, written = around.written] {
+  out.wait_for_files = [this, written = backend.wait_for_files] {
     Status status = written();
     step_back(k_niceness);
     is_capturing_ = false;
@@ -109,7 +109,7 @@ std::string LiveRecalibration::words() const {
   return is_capturing_ ? fmt::format("{} of {} patterns", shown_.load(), images_) : "computing";
 }
 
-std::optional<Result<Rechecked>> LiveRecalibration::take() {
+std::optional<Result<Rechecked>> LiveRecalibration::take_result() {
   if (!result_.valid() || result_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
     return std::nullopt;
   is_capturing_ = false;

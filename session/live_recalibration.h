@@ -27,10 +27,10 @@ Result<std::filesystem::path> recalibration_folder(const std::filesystem::path& 
 /// priority.
 class LiveRecalibration {
  public:
-  /// `around` must set stage, written and use_latency; its images go to the writer that it is given.
+  /// `backend` must set stage, written and use_latency; its images go to the writer that it is given.
   LiveRecalibration(const Rig& rig,
                     std::filesystem::path folder,
-                    const std::function<Surroundings(ImageWriter*)>& around);
+                    const std::function<WizardBackend(ImageWriter*)>& backend);
   /// Cancels the recheck; this takes a second at most.
   ~LiveRecalibration();
   LiveRecalibration(const LiveRecalibration&) = delete;
@@ -43,12 +43,12 @@ class LiveRecalibration {
   /// The progress in words: "12 of 44 patterns", "computing".
   std::string words() const;
   /// The result when it is finished, once; otherwise nullopt.
-  std::optional<Result<Rechecked>> take();
+  std::optional<Result<Rechecked>> take_result();
 
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
-  Surroundings through_errands(Surroundings around);
+  WizardBackend through_errands(WizardBackend backend);
 
   std::filesystem::path folder_;
   int images_ = 0;

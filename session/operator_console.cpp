@@ -26,14 +26,14 @@ std::string list_of(const std::vector<BodyMarker>& markers) {
 
 std::vector<OperatorView::Image> cameras_of(const Session& session) {
   std::vector<OperatorView::Image> out;
-  const Percepts& watched = session.watched();
+  const Percepts& percepts = session.percepts();
   const std::vector<Imager>& cameras = session.setup().rig.cameras;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     out.push_back({.name = cameras[i].name, .image = {}});
     out.back().is_linear = encoding_of(session.setup().rig, cameras[i]) == tracker::Encoding::linear;
-    if (i >= watched.frames.size()) continue;
-    out.back().image = watched.frames[i].image;
-    for (const tracker::Detection& detection : watched.detections[i])
+    if (i >= percepts.frames.size()) continue;
+    out.back().image = percepts.frames[i].image;
+    for (const tracker::Detection& detection : percepts.detections[i])
       out.back().found.push_back({detection.marker.id, detection.corners_px});
   }
   return out;
@@ -43,7 +43,7 @@ std::vector<OperatorView::Body> bodies_of(const Session& session) {
   std::vector<OperatorView::Body> out;
   for (const Body& body : scene::bodies(session.setup().scene)) {
     out.push_back({body.name, list_of(body.markers), std::nullopt});
-    for (const Track& track : session.painted().tracks)
+    for (const Track& track : session.composed().tracks)
       if (track.body == body.name) out.back().track = track;
   }
   return out;
@@ -62,7 +62,7 @@ std::vector<OperatorView::Slot> slots_of(const Session& session, const std::stri
 
 }  // namespace
 
-OperatorView::Remote shown(const Invitation& invitation) {
+OperatorView::Remote remote_view(const Invitation& invitation) {
   OperatorView::Remote out{invitation.url, invitation.fingerprint, invitation.authority_fingerprint, {}};
   for (const scene::Role role : {scene::Role::look, scene::Role::work, scene::Role::operate}) {
     cv::Mat code = qr_code(invitation.url_for(role));
@@ -79,17 +79,17 @@ Result<OperatorConsole> OperatorConsole::open(const device::Desktop& desktop, co
 
 void OperatorConsole::invite(RemoteLink* remote) {
   remote_link_ = remote;
-  remote_ = apps::shown(remote->invitation());
+  remote_ = apps::remote_view(remote->invitation());
 }
 
-void OperatorConsole::shown(const ShownFrame& frame) {
+void OperatorConsole::count_frame(const ShownFrame& frame) {
   recent_.push_back(frame);
   if (recent_.size() > k_recent) recent_.pop_front();
   if (frame.screen_ms >= 0) screen_s_ = 1e-3 * frame.screen_ms;
 }
 
-void OperatorConsole::tell(const SessionMoment& moment) {
-  if (moment.shown) shown(*moment.shown);
+void OperatorConsole::publish_state(const SessionMoment& moment) {
+  if (moment.shown) count_frame(*moment.shown);
   ends_session_ = !serve(&moment.session, &moment.telemetry, moment.health, moment.screen, moment.at);
 }
 
@@ -125,19 +125,19 @@ OperatorView OperatorConsole::view_of(const Session& session,
   view.cameras = cameras_of(session);
   const std::vector<Imager>& projectors = session.setup().rig.projectors;
   for (std::size_t i = 0; i < projectors.size(); ++i)
-    view.projectors.push_back({.name = projectors[i].name, .image = session.painted().projectors[i]});
+    view.projectors.push_back({.name = projectors[i].name, .image = session.composed().projectors[i]});
   view.screen = {.name = "screen", .image = screen_};
   view.devices = devices_of(health, now);
   view.bodies = bodies_of(session);
   view.slots = slots_of(session, keys_.slot());
   view.show_state = session.show_state();
   for (const LooseMarker& loose :
-       waiting_markers(session.setup().scene, session.show_state(), session.watched()))
+       waiting_markers(session.setup().scene, session.show_state(), session.percepts()))
     view.waiting.push_back(loose.marker.text());
   view.remote = remote_;
   if (view.remote) view.remote->projector = remote_link_->code_projector();
   view.windows = {session.windows().begin(), session.windows().end()};
-  view.follows = session.painted().follows;
+  view.follows = session.composed().follows;
   if (const auto& drift = session.drift())
     for (const std::string& device : drift->devices)
       view.moved += (view.moved.empty() ? "" : " or ") + device;

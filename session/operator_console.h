@@ -19,7 +19,7 @@
 namespace limn::apps {
 
 /// The invitation as the window shows it, with QR codes for phones.
-OperatorView::Remote shown(const Invitation& invitation);
+OperatorView::Remote remote_view(const Invitation& invitation);
 
 /// The operator's window and keys. Belongs to the session's thread; the session's GL context stays current.
 class OperatorConsole : public SessionClient {
@@ -33,7 +33,7 @@ class OperatorConsole : public SessionClient {
   Keys& keys() { return keys_; }
 
   /// To be called for each frame that was shown.
-  void shown(const ShownFrame& frame);
+  void count_frame(const ShownFrame& frame);
   /// Whether the next serve() redraws the window and needs a screen's image.
   bool is_due() const { return window_.is_due(screen_s_); }
   /// Sends the edits of keys and of the window to the session; an edit that fails becomes a note. Draws the
@@ -42,8 +42,8 @@ class OperatorConsole : public SessionClient {
   bool serve(
       Session* session, Telemetry* telemetry, const DeviceHealth& health, const cv::Mat& screen, Stamp now);
 
-  void hear(const SessionMoment&) override {}  // serve() does both
-  void tell(const SessionMoment& moment) override;
+  void apply_edits(const SessionMoment&) override {}  // serve() does both
+  void publish_state(const SessionMoment& moment) override;
   bool wants_screen() const override { return is_due(); }
   bool ends_session() const override { return ends_session_; }
 

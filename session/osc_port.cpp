@@ -58,7 +58,7 @@ Result<OscPort> OscPort::open(const std::string& hear, const std::string& tell) 
   return out;
 }
 
-void OscPort::hear(Session* session, Telemetry* telemetry, Stamp at) {
+void OscPort::apply_edits(Session* session, Telemetry* telemetry, Stamp at) {
   if (!ear_) return;
   std::array<std::uint8_t, k_longest_osc + 1> bytes;
   const Stamp begun = now();
@@ -84,14 +84,14 @@ void OscPort::refuse(const std::string& why, Telemetry* telemetry, Stamp at) {
   untold_ = 0;
 }
 
-void OscPort::tell(const Session& session, Stamp at) {
+void OscPort::publish_state(const Session& session, Stamp at) {
   if (!mouth_) return;
   if (!told_all_at_ || at - *told_all_at_ >= k_between_all) {
     told_all_at_ = at;
     told_.clear();
   }
   const scene::ShowState& show_state = session.show_state();
-  const scene::PosedScene& posed = session.painted().posed;
+  const scene::PosedScene& posed = session.composed().posed;
   const auto put_all = [&](const std::string& name, std::vector<OscValue> values) {
     put(name, "/limn/state/" + name, std::move(values));
   };

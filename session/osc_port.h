@@ -26,13 +26,15 @@ class OscPort : public SessionClient {
   /// Applies the edits of the messages that wait, at most k_most_at_once of them and for at most 5 ms; the
   /// others wait for the next call. Refused messages are reported at most once a second, with the number of
   /// further ones. `at`: the session's present time.
-  void hear(Session* session, Telemetry* telemetry, Stamp at);
+  void apply_edits(Session* session, Telemetry* telemetry, Stamp at);
   /// Sends what has changed since it was last sent; once a second it sends everything, because datagrams get
   /// lost.
-  void tell(const Session& session, Stamp at);
+  void publish_state(const Session& session, Stamp at);
 
-  void hear(const SessionMoment& moment) override { hear(&moment.session, &moment.telemetry, moment.at); }
-  void tell(const SessionMoment& moment) override { tell(moment.session, moment.at); }
+  void apply_edits(const SessionMoment& moment) override {
+    apply_edits(&moment.session, &moment.telemetry, moment.at);
+  }
+  void publish_state(const SessionMoment& moment) override { publish_state(moment.session, moment.at); }
 
   /// The port on which it receives; 0: none.
   int port() const { return ear_ ? ear_->port() : 0; }

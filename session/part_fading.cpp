@@ -39,7 +39,7 @@ void PartFading::note(const scene::Scene& scene,
                       Stamp at) {
   note_lost(posed, at);
   note_variants(scene, show_state, at);
-  shown_ = posed;
+  faded_ = posed;
 }
 
 void PartFading::note_lost(const scene::PosedScene& posed, Stamp at) {
@@ -47,13 +47,13 @@ void PartFading::note_lost(const scene::PosedScene& posed, Stamp at) {
     return std::find_if(where.parts.begin(), where.parts.end(),
                         [&](const scene::PosedPart& part) { return part.slot == slot; });
   };
-  for (const scene::PosedPart& part : shown_.parts)
+  for (const scene::PosedPart& part : faded_.parts)
     if (find(posed, part.slot) == posed.parts.end()) fading_[part.slot] = {part, at};
   for (const scene::PosedPart& part : posed.parts) fading_.erase(part.slot);
   if (posed.world_from_prototype)
     gone_.reset();
-  else if (shown_.world_from_prototype)
-    gone_ = {shown_, at};
+  else if (faded_.world_from_prototype)
+    gone_ = {faded_, at};
   std::erase_if(fading_, [&](const auto& entry) {
     return seconds_between(entry.second.lost_at, at) > std::max(options_.fade_s, options_.lost_s);
   });
@@ -75,7 +75,7 @@ cv::Mat PartFading::image(std::size_t projector,
                           const Imager& viewer,
                           Stamp at,
                           projector::Renderer* renderer) const {
-  cv::Mat image = renderer->projector_image(projector, shown_, viewer);
+  cv::Mat image = renderer->projector_image(projector, faded_, viewer);
   if (gone_) {
     const double share = 1 - seconds_between(gone_->lost_at, at) / options_.fade_s;
     return share <= 0 ? image
@@ -84,7 +84,7 @@ cv::Mat PartFading::image(std::size_t projector,
   for (const auto& [slot, fading] : fading_) {
     const double share = 1 - seconds_between(fading.lost_at, at) / options_.fade_s;
     if (share <= 0) continue;
-    scene::PosedScene with = shown_;
+    scene::PosedScene with = faded_;
     with.parts.push_back(fading.part);
     image = mixed(image, renderer->projector_image(projector, with, viewer), share);
   }

@@ -36,7 +36,7 @@ class PartFading {
   cv::Mat image(std::size_t projector, const Imager& viewer, Stamp at, projector::Renderer* renderer) const;
 
   /// The posed scene that was noted last.
-  const scene::PosedScene& shown() const { return shown_; }
+  const scene::PosedScene& faded() const { return faded_; }
   /// When the part of a slot was lost; nullopt: not recently.
   std::optional<Stamp> lost_at(const std::string& slot) const;
   /// The label of a slot; null: its variant was not changed recently.
@@ -55,7 +55,7 @@ class PartFading {
   void note_variants(const scene::Scene& scene, const scene::ShowState& show_state, Stamp at);
 
   ComposeOptions options_;
-  scene::PosedScene shown_;
+  scene::PosedScene faded_;
   std::map<std::string, Fading> fading_;         // by slot
   std::optional<Gone> gone_;                     // the whole scene, if the prototype was lost
   std::map<std::string, std::string> variants_;  // last shown, by slot

@@ -40,10 +40,10 @@ bool has_moved(const tracker::Detection& now, const tracker::Detection& before) 
 }
 
 // Predicts markers `seconds` ahead, with the image motion that they had in the `seconds_before`.
-std::vector<tracker::Detection> foretold(const std::vector<tracker::Detection>& last,
-                                         const std::vector<tracker::Detection>& before,
-                                         double seconds,
-                                         double seconds_before) {
+std::vector<tracker::Detection> predicted_detections(const std::vector<tracker::Detection>& last,
+                                                     const std::vector<tracker::Detection>& before,
+                                                     double seconds,
+                                                     double seconds_before) {
   std::vector<tracker::Detection> next = last;
   if (!(seconds_before > 0 && seconds > 0 && seconds < k_like_moments * seconds_before)) return next;
   for (tracker::Detection& marker : next) {
@@ -90,72 +90,73 @@ Result<Perception> Perception::create(const scene::Scene& scene,
     gestures.emplace_back(control.marker, control.gesture);
   }
   for (const Imager& camera : rig.cameras)
-    out.eyes_.push_back({tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures});
+    out.camera_states_.push_back(
+        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures});
   out.used_at_.resize(scene.controls.size());
-  out.watched_.frames.resize(rig.cameras.size());
-  out.watched_.detections.resize(rig.cameras.size());
+  out.percepts_.frames.resize(rig.cameras.size());
+  out.percepts_.detections.resize(rig.cameras.size());
   return out;
 }
 
 const Percepts& Perception::watch(std::span<const Frame> frames) {
   const auto begun = std::chrono::steady_clock::now();
-  watched_.uses.clear();
+  percepts_.uses.clear();
   std::vector<std::size_t> cameras;
   for (const Frame& frame : frames) {
     const Imager* camera = find_named(rig_.cameras, frame.camera);
     LIMN_CHECK(camera != nullptr);
     cameras.push_back(static_cast<std::size_t>(camera - rig_.cameras.data()));
-    look(cameras.back(), frame);
-    watched_.captured_at = std::max(watched_.captured_at, frame.captured_at);
+    update_camera(cameras.back(), frame);
+    percepts_.captured_at = std::max(percepts_.captured_at, frame.captured_at);
   }
   read_gestures(cameras);
-  watched_.detect_ms = milliseconds_since(begun);
+  percepts_.detect_ms = milliseconds_since(begun);
 
   note_loose(cameras);
   const auto filtering = std::chrono::steady_clock::now();
   std::vector<tracker::View> views;
-  for (const std::size_t i : cameras) views.push_back({&rig_.cameras[i], watched_.detections[i]});
+  for (const std::size_t i : cameras) views.push_back({&rig_.cameras[i], percepts_.detections[i]});
   if (!views.empty()) {
     std::vector<Body> bodies = bodies_;
     for (const Loose& loose : loose_)
       if (loose.moments >= k_known_after)
         bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
-    watched_.motions =
-        tracker::observed(watched_.motions, bodies, views, watched_.captured_at, options_.motion);
-    watched_.tracks = tracker::predicted(watched_.motions, watched_.captured_at,
-                                         tracker::Prediction::filtered, options_.motion);
+    percepts_.motions =
+        tracker::observed(percepts_.motions, bodies, views, percepts_.captured_at, options_.motion);
+    percepts_.tracks = tracker::predicted(percepts_.motions, percepts_.captured_at,
+                                          tracker::Prediction::filtered, options_.motion);
     follow_loose();
   }
-  watched_.filter_ms = milliseconds_since(filtering);
-  return watched_;
+  percepts_.filter_ms = milliseconds_since(filtering);
+  return percepts_;
 }
 
 // Follows known markers near their predicted positions. Searches the whole image for others from time to
 // time, and when a marker is gone.
-void Perception::look(std::size_t camera, const Frame& frame) {
-  Eye& eye = eyes_[camera];
+void Perception::update_camera(std::size_t camera, const Frame& frame) {
+  CameraState& state = camera_states_[camera];
   const Lens* lens = &rig_.cameras[camera].lens;
-  std::vector<tracker::Detection>& detections = watched_.detections[camera];
-  watched_.frames[camera] = frame;
-  eye.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
-  const double seconds = seconds_between(eye.seen_at, frame.captured_at);
+  std::vector<tracker::Detection>& detections = percepts_.detections[camera];
+  percepts_.frames[camera] = frame;
+  state.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
+  const double seconds = seconds_between(state.seen_at, frame.captured_at);
   const std::vector<tracker::Detection> next =
-      foretold(detections, eye.before, seconds, std::exchange(eye.seconds, seconds));
-  eye.seen_at = frame.captured_at;
-  std::swap(eye.before, detections);
-  eye.detector.follow(eye.grey, lens, next, &detections);
+      predicted_detections(detections, state.before, seconds, std::exchange(state.seconds, seconds));
+  state.seen_at = frame.captured_at;
+  std::swap(state.before, detections);
+  state.detector.follow(state.grey, lens, next, &detections);
   const bool is_one_gone = detections.size() < next.size();
-  if (--eye.until_search > 0 && !is_one_gone) return;
-  const bool covered = eye.searches++ % k_covered_every == 0 || !all_are_seen();
-  eye.detector.detect_more(eye.grey, lens, &detections,
-                           covered ? tracker::Reading::covered : tracker::Reading::open);
-  eye.until_search = (all_are_seen() ? k_rarer : 1) * options_.full_scan_every;
+  if (--state.until_search > 0 && !is_one_gone) return;
+  const bool covered = state.searches++ % k_covered_every == 0 || !all_are_seen();
+  state.detector.detect_more(state.grey, lens, &detections,
+                             covered ? tracker::Reading::covered : tracker::Reading::open);
+  state.until_search = (all_are_seen() ? k_rarer : 1) * options_.full_scan_every;
 }
 
 // Whether each marker that bodies and controls use is seen by some camera.
 bool Perception::all_are_seen() const {
   return std::all_of(used_.begin(), used_.end(), [&](const MarkerName& used) {
-    return std::any_of(watched_.detections.begin(), watched_.detections.end(), [&](const auto& of_camera) {
+    return std::any_of(percepts_.detections.begin(), percepts_.detections.end(), [&](const auto& of_camera) {
       return std::any_of(of_camera.begin(), of_camera.end(), [&](const tracker::Detection& detection) {
         return tracker::is_marker(detection.marker, used);
       });
@@ -165,10 +166,10 @@ bool Perception::all_are_seen() const {
 
 // Notes seen markers that the scene does not use (of the scene's families).
 void Perception::note_loose(std::span<const std::size_t> cameras) {
-  const Stamp at = watched_.captured_at;
+  const Stamp at = percepts_.captured_at;
   std::vector<MarkerName> seen;
   for (const std::size_t camera : cameras)
-    for (const tracker::Detection& detection : watched_.detections[camera])
+    for (const tracker::Detection& detection : percepts_.detections[camera])
       if (std::none_of(used_.begin(), used_.end(),
                        [&](const MarkerName& used) { return tracker::is_marker(detection.marker, used); }))
         seen.push_back(detection.marker);
@@ -191,24 +192,24 @@ void Perception::note_loose(std::span<const std::size_t> cameras) {
 
 // Updates the poses of loose markers, and since when each is still.
 void Perception::follow_loose() {
-  watched_.loose.clear();
+  percepts_.loose.clear();
   if (loose_.empty()) return;
-  for (const Track& track : watched_.tracks) {
+  for (const Track& track : percepts_.tracks) {
     const auto loose = std::find_if(loose_.begin(), loose_.end(), [&](const Loose& l) {
       return scene::loose_body(l.marker) == track.body;
     });
     if (loose == loose_.end() || track.tracking == TrackingState::lost) continue;
     const Pose& now = track.world_from_body;
-    const bool lies = seconds_between(loose->still_since, watched_.captured_at) >= k_lies_after_s;
+    const bool lies = seconds_between(loose->still_since, percepts_.captured_at) >= k_lies_after_s;
     if (!loose->anchor ||
         (now.translation - loose->anchor->translation).norm() > (lies ? k_lying_m : k_still_m) ||
         angle_between(now.rotation, loose->anchor->rotation) > (lies ? k_lying_rad : k_still_rad)) {
       loose->anchor = now;
-      loose->still_since = watched_.captured_at;
+      loose->still_since = percepts_.captured_at;
     }
-    watched_.loose.push_back({loose->marker, now, loose->still_since});
+    percepts_.loose.push_back({loose->marker, now, loose->still_since});
   }
-  std::stable_sort(watched_.loose.begin(), watched_.loose.end(),
+  std::stable_sort(percepts_.loose.begin(), percepts_.loose.end(),
                    [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
 }
 
@@ -217,15 +218,16 @@ void Perception::follow_loose() {
 // hand's way.
 void Perception::read_gestures(std::span<const std::size_t> cameras) {
   for (const std::size_t camera : cameras) {
-    std::vector<tracker::GestureReader>& gestures = eyes_[camera].gestures;
-    const Stamp at = watched_.frames[camera].captured_at;
+    std::vector<tracker::GestureReader>& gestures = camera_states_[camera].gestures;
+    const Stamp at = percepts_.frames[camera].captured_at;
     std::vector<int> steps;
     for (tracker::GestureReader& gesture : gestures)
-      steps.push_back(gesture.read(eyes_[camera].grey, watched_.detections[camera], at));
+      steps.push_back(gesture.read(camera_states_[camera].grey, percepts_.detections[camera], at));
     for (std::size_t i = 0; i < gestures.size(); ++i) {
       if (steps[i] == 0) continue;
       const bool is_seen_elsewhere =
-          !gestures[i].is_seen() && std::any_of(eyes_.begin(), eyes_.end(), [&](const Eye& other) {
+          !gestures[i].is_seen() &&
+          std::any_of(camera_states_.begin(), camera_states_.end(), [&](const Eye& other) {
             return &other.gestures != &gestures && other.gestures[i].is_seen();
           });
       const bool is_arms = std::any_of(gestures.begin(), gestures.end(), [&](const auto& other) {
@@ -234,7 +236,7 @@ void Perception::read_gestures(std::span<const std::size_t> cameras) {
       const bool is_known = used_at_[i] != Stamp{} && seconds_between(used_at_[i], at) < k_once_s;
       if (is_seen_elsewhere || is_arms || is_known) continue;
       used_at_[i] = at;
-      watched_.uses.push_back({i, steps[i]});
+      percepts_.uses.push_back({i, steps[i]});
     }
   }
 }

@@ -73,10 +73,10 @@ class Perception {
   /// Processes the frames of one moment, at most one per camera; a camera without a frame keeps its last
   /// detections. The result stays valid until the next call.
   const Percepts& watch(std::span<const Frame> frames);
-  const Percepts& watched() const { return watched_; }
+  const Percepts& percepts() const { return percepts_; }
 
  private:
-  struct Eye {
+  struct CameraState {
     tracker::Detector detector;
     std::vector<tracker::GestureReader> gestures;  // one per control
     int until_search = 0, searches = 0;
@@ -93,7 +93,7 @@ class Perception {
     Stamp still_since;
   };
   Perception() = default;
-  void look(std::size_t camera, const Frame& frame);
+  void update_camera(std::size_t camera, const Frame& frame);
   bool all_are_seen() const;
   void note_loose(std::span<const std::size_t> cameras);
   void follow_loose();
@@ -105,9 +105,9 @@ class Perception {
   double loose_size_m_ = 0;
   std::vector<MarkerName> used_;  // markers of bodies and controls
   std::vector<Loose> loose_;
-  std::vector<Eye> eyes_;       // one per camera
-  std::vector<Stamp> used_at_;  // one per control
-  Percepts watched_;
+  std::vector<CameraState> camera_states_;  // one per camera
+  std::vector<Stamp> used_at_;              // one per control
+  Percepts percepts_;
 };
 
 }  // namespace limn::apps

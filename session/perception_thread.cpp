@@ -18,10 +18,10 @@ PerceptionThread::PerceptionThread(Perception* perception,
   start();
 }
 
-Perceived PerceptionThread::take(std::chrono::nanoseconds wait) {
+Perceived PerceptionThread::take_percepts(std::chrono::nanoseconds wait) {
   Perceived out;
-  if (auto seen = seen_.take(wait)) {
-    out.watched = std::move(seen->watched);
+  if (auto seen = seen_.take_newest(wait)) {
+    out.percepts = std::move(seen->percepts);
     out.moments = seen->moments;
   }
   return out;
@@ -39,15 +39,16 @@ void PerceptionThread::stop() {
 
 void PerceptionThread::run() try {
   while (!is_stopping_) {
-    auto newest = cameras_->take(k_frames_wait);
+    auto newest = cameras_->take_frames(k_frames_wait);
     if (!newest) continue;
     std::vector<Frame> frames;
     for (auto& [name, frame] : *newest) frames.push_back(std::move(frame));
     std::sort(frames.begin(), frames.end(),
               [](const Frame& a, const Frame& b) { return a.captured_at < b.captured_at; });
-    if (recorder_) recorder_->watched(frames);
+    if (recorder_) recorder_->record_frames(frames);
     seen_.put({perception_->watch(frames), ++moments_}, [](const Seen& old, Seen& next) {
-      next.watched.uses.insert(next.watched.uses.begin(), old.watched.uses.begin(), old.watched.uses.end());
+      next.percepts.uses.insert(next.percepts.uses.begin(), old.percepts.uses.begin(),
+                                old.percepts.uses.end());
     });
   }
 } catch (const std::exception& bug) {

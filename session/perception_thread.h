@@ -23,7 +23,7 @@ class PerceptionThread {
   ~PerceptionThread() { stop(); }
 
   /// The newest percepts that were not taken yet; waits up to `wait` for them.
-  Perceived take(std::chrono::nanoseconds wait);
+  Perceived take_percepts(std::chrono::nanoseconds wait);
 
   /// Between stop() and start() the perception object may be replaced.
   void start();
@@ -31,7 +31,7 @@ class PerceptionThread {
 
  private:
   struct Seen {
-    Percepts watched;
+    Percepts percepts;
     std::size_t moments = 0;
   };
   void run();

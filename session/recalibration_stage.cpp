@@ -24,7 +24,7 @@ void RecalibrationStage::step(const FrameClock& clock) {
   }
   if (holds_light()) recalibration_->serve(k_errand_wait);
   session_->set_recalibration_progress(recalibration_->words());
-  if (const auto checked = recalibration_->take()) {
+  if (const auto checked = recalibration_->take_result()) {
     pause();
     apply_recalibration(*checked, recalibration_->folder(), clock.now(), perception_, session_);
     recalibration_.reset();
@@ -37,7 +37,7 @@ void RecalibrationStage::begin(const FrameClock& clock) {
   if (!folder) return session_->warn(clock.now(), folder.message());
   pause();
   recalibration_ = std::make_unique<LiveRecalibration>(
-      session_->setup().rig, *folder, [this](ImageWriter* writer) { return devices_->surroundings(writer); });
+      session_->setup().rig, *folder, [this](ImageWriter* writer) { return devices_->backend(writer); });
 }
 
 void RecalibrationStage::pause() {

@@ -16,7 +16,7 @@ class CaptureDevices {
  public:
   virtual ~CaptureDevices() = default;
   /// The device functions that a LiveRecalibration needs; images go to `writer`.
-  virtual Surroundings surroundings(ImageWriter* writer) = 0;
+  virtual WizardBackend backend(ImageWriter* writer) = 0;
   /// Stops perception, because the cameras will see patterns. The session receives the last percepts from
   /// before.
   virtual void pause_perception(Session* session) = 0;

@@ -82,7 +82,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const
   return out;
 }
 
-void Recorder::watched(std::span<const Frame> frames) {
+void Recorder::record_frames(std::span<const Frame> frames) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   nlohmann::ordered_json event = {{"watch", nlohmann::ordered_json::array()}};
@@ -98,7 +98,7 @@ void Recorder::watched(std::span<const Frame> frames) {
   write(event);
 }
 
-void Recorder::shown(const scene::Scene& scene) {
+void Recorder::record_scene(const scene::Scene& scene) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   const std::string copy = fmt::format("scene-{}", ++scenes_);
@@ -106,7 +106,7 @@ void Recorder::shown(const scene::Scene& scene) {
   write({{"scene", copy}});
 }
 
-Rig Recorder::mended(Rig rig, std::size_t moments) {
+Rig Recorder::record_rig(Rig rig, std::size_t moments) {
   const std::lock_guard lock(mutex_);
   if (ended_) return rig;
   const std::string copy = fmt::format("rig-{}", ++rigs_);
@@ -120,7 +120,7 @@ Rig Recorder::mended(Rig rig, std::size_t moments) {
   return std::move(*read);
 }
 
-void Recorder::edited(const scene::Edit& edit, const std::string& source, std::size_t moments) {
+void Recorder::record_edit(const scene::Edit& edit, const std::string& source, std::size_t moments) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   write({{"edit", {{"action", edit.action}, {"slot", edit.slot}, {"value", edit.value}}},
@@ -128,7 +128,9 @@ void Recorder::edited(const scene::Edit& edit, const std::string& source, std::s
          {"moments", moments}});
 }
 
-void Recorder::saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
+void Recorder::record_tablet(const std::string& guest,
+                             const std::optional<Eigen::Vector3d>& p_eye_world,
+                             Stamp at) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   nlohmann::ordered_json eye = {{"guest", guest}, {"at_ns", nanoseconds(at)}};
@@ -136,12 +138,12 @@ void Recorder::saw(const std::string& guest, const std::optional<Eigen::Vector3d
   write({{"eye", eye}});
 }
 
-void Recorder::painted(const ComposedFrame& painted, std::size_t moments) {
+void Recorder::record_images(const ComposedFrame& composed, std::size_t moments) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
-  write({{"paint", pose_log(painted)},
+  write({{"paint", pose_log(composed)},
          {"moments", moments},
-         {"pictures", fmt::format("{:016x}", fingerprint(painted.projectors))}});
+         {"pictures", fmt::format("{:016x}", fingerprint(composed.projectors))}});
 }
 
 void Recorder::write(const nlohmann::ordered_json& event) {
@@ -179,19 +181,19 @@ std::uint64_t fingerprint(std::span<const cv::Mat> images) {
   return hash;
 }
 
-nlohmann::ordered_json pose_log(const ComposedFrame& painted) {
-  nlohmann::ordered_json json = {{"painted_at_ns", nanoseconds(painted.painted_at)},
-                                 {"shown_at_ns", nanoseconds(painted.shown_at)}};
+nlohmann::ordered_json pose_log(const ComposedFrame& composed) {
+  nlohmann::ordered_json json = {{"painted_at_ns", nanoseconds(composed.painted_at)},
+                                 {"shown_at_ns", nanoseconds(composed.shown_at)}};
   json["tracks"] = nlohmann::ordered_json::array();
-  for (const Track& track : painted.tracks)
+  for (const Track& track : composed.tracks)
     json["tracks"].push_back({{"body", track.body},
                               {"sight", static_cast<int>(track.tracking)},
                               {"world_from_body", to_json(track.world_from_body)}});
   json["parts"] = nlohmann::ordered_json::array();
-  for (const scene::PosedPart& part : painted.posed.parts)
+  for (const scene::PosedPart& part : composed.posed.parts)
     json["parts"].push_back(
         {{"slot", part.slot}, {"variant", part.variant}, {"world_from_part", to_json(part.world_from_part)}});
-  if (const auto& p = painted.p_guest_eye_world) json["guest_eye"] = {p->x(), p->y(), p->z()};
+  if (const auto& p = composed.p_guest_eye_world) json["guest_eye"] = {p->x(), p->y(), p->z()};
   return json;
 }
 

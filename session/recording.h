@@ -41,19 +41,19 @@ class Recorder {
                                                   const SessionSetup& setup);
 
   /// Records the frames of one moment, as they are passed to Perception::watch.
-  void watched(std::span<const Frame> frames);
+  void record_frames(std::span<const Frame> frames);
   /// To be called when the scene's files have changed: copies them as they are now.
-  void shown(const scene::Scene& scene);
+  void record_scene(const scene::Scene& scene);
   /// Records the rig that is used from now on; returns it as a replay will read it, to the last bit.
   /// `moments`: as in edited().
-  Rig mended(Rig rig, std::size_t moments);
+  Rig record_rig(Rig rig, std::size_t moments);
   /// Records an edit. `moments`: the number of calls of watched() whose percepts the session had received.
-  void edited(const scene::Edit& edit, const std::string& source, std::size_t moments);
+  void record_edit(const scene::Edit& edit, const std::string& source, std::size_t moments);
   /// Records the position (world frame, m) of a guest's tablet that the viewpoint depends on; nullopt: it has
   /// none any more.
-  void saw(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
+  void record_tablet(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
   /// Records a composed frame. `moments`: as in edited().
-  void painted(const ComposedFrame& painted, std::size_t moments);
+  void record_images(const ComposedFrame& composed, std::size_t moments);
 
   /// Why the recording ended before the session; nullopt: it did not.
   std::optional<std::string> ended() const;
@@ -77,7 +77,7 @@ class Recorder {
 std::uint64_t fingerprint(std::span<const cv::Mat> images);
 
 /// The part of a line of events.jsonl that a replay compares: stamps, tracks and parts, with all digits.
-nlohmann::ordered_json pose_log(const ComposedFrame& painted);
+nlohmann::ordered_json pose_log(const ComposedFrame& composed);
 
 /// Reads the image of a recorded frame; the camera's name and the stamp are not in the file. Error: the file
 /// is damaged or missing.

@@ -8,12 +8,12 @@ constexpr double k_renew_every_s = 1;
 }  // namespace
 
 RecoveringComposer::RecoveringComposer(FrameComposer composer)
-    : composer_(std::move(composer)), painted_(composer_->painted()) {}
+    : composer_(std::move(composer)), composed_(composer_->composed()) {}
 
 std::optional<std::string> RecoveringComposer::compose(const FrameInput& input, const SessionSetup& setup) {
   if (composer_) composer_->compose(input);
   if (!composer_ || (drawing_.is_lost && drawing_.is_lost())) return compose_anew(input, setup);
-  painted_ = composer_->painted();
+  composed_ = composer_->composed();
   return std::nullopt;
 }
 
@@ -28,7 +28,7 @@ std::optional<std::string> RecoveringComposer::compose_anew(const FrameInput& in
     auto composer = FrameComposer::create(setup.scene, setup.rig, setup.paint);
     if (composer) {
       composer_ = std::move(*composer);
-      painted_ = composer_->compose(input);
+      composed_ = composer_->compose(input);
     } else {
       renewed = composer.error();
     }

@@ -29,7 +29,7 @@ class RecoveringComposer {
   /// `setup`: what a composer in a new context is created for. Returns a message for people, if there is one.
   std::optional<std::string> compose(const FrameInput& input, const SessionSetup& setup);
   /// The last composed frame.
-  const ComposedFrame& painted() const { return painted_; }
+  const ComposedFrame& composed() const { return composed_; }
 
   /// Null while there is no GL context.
   FrameComposer* composer() { return composer_ ? &*composer_ : nullptr; }
@@ -41,7 +41,7 @@ class RecoveringComposer {
 
   Drawing drawing_;
   std::optional<FrameComposer> composer_;
-  ComposedFrame painted_;
+  ComposedFrame composed_;
   Stamp renewed_at_;
 };
 

@@ -12,8 +12,10 @@ class SceneFilesClient final : public SessionClient {
  public:
   explicit SceneFilesClient(std::filesystem::path folder) : files_(std::move(folder)) {}
 
-  void hear(const SessionMoment& moment) override { moment.session.show_news(&files_, moment.at); }
-  void tell(const SessionMoment&) override {}
+  void apply_edits(const SessionMoment& moment) override {
+    moment.session.reload_changed_scene(&files_, moment.at);
+  }
+  void publish_state(const SessionMoment&) override {}
 
  private:
   SceneWatch files_;

@@ -47,7 +47,7 @@ bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
 
 }  // namespace
 
-void tell(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry) {
+void report_skipped(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry) {
   for (const scene::SkippedVariant& part : skipped_variants) {
     const std::string what = fmt::format("{} of slot {} is left out: {}", part.variant, part.slot, part.why);
     if (telemetry) telemetry->note(at, what);
@@ -93,25 +93,25 @@ void Session::ask_units() {
     for (const scene::Variant& variant : slot.variants) {
       const std::string question = scene::units_question(slot, variant);
       if (!question.empty() && telemetry_ && asked_.insert(question).second)
-        telemetry_->note(watched_.captured_at, question);
+        telemetry_->note(percepts_.captured_at, question);
     }
 }
 
-void Session::take(Percepts watched, std::size_t moments) {
-  watched_ = std::move(watched);
+void Session::update_percepts(Percepts percepts, std::size_t moments) {
+  percepts_ = std::move(percepts);
   moments_ = moments;
-  prediction_ = predicted_at_capture(watched_, setup_.paint);
+  prediction_ = predicted_at_capture(percepts_, setup_.paint);
   show_state_ = scene::without_moved_pins(
       setup_.scene, show_state_, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_capture));
-  for (const ControlUse& use : watched_.uses) {
+  for (const ControlUse& use : percepts_.uses) {
     const scene::Control& control = setup_.scene.controls[use.control];
-    const Status done = edit(edit_of(control, use.steps), control.marker.text(), watched_.captured_at);
+    const Status done = edit(edit_of(control, use.steps), control.marker.text(), percepts_.captured_at);
     if (!done) log_warning("live: {}: {}", control.marker.text(), done.message());
   }
-  watched_.uses.clear();
+  percepts_.uses.clear();
   const auto swapped =
-      swapped_.check(setup_.rig, scene::bodies(setup_.scene), watched_.detections, watched_.captured_at);
-  if (swapped) warn(watched_.captured_at, *swapped);
+      swapped_.check(setup_.rig, scene::bodies(setup_.scene), percepts_.detections, percepts_.captured_at);
+  if (swapped) warn(percepts_.captured_at, *swapped);
 }
 
 void Session::warn(Stamp at, const std::string& what) {
@@ -123,14 +123,14 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   scene::Edit edit = wanted;
   LIMN_TRY(scene::Command command, scene::command_of(setup_.scene, edit));
   if (auto* marker = std::get_if<std::optional<MarkerName>>(&command.value); marker && !*marker)
-    if (const auto waiting = waiting_markers(setup_.scene, show_state_, watched_); !waiting.empty()) {
+    if (const auto waiting = waiting_markers(setup_.scene, show_state_, percepts_); !waiting.empty()) {
       *marker = waiting.back().marker;  // this name is also what is recorded
       edit.value = (*marker)->text();
     }
-  LIMN_TRY(scene::ShowState changed, scene::apply_edit(setup_.scene, show_state_, painted().posed, command));
+  LIMN_TRY(scene::ShowState changed, scene::apply_edit(setup_.scene, show_state_, composed().posed, command));
   std::swap(show_state_, changed);
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
-  if (recorder_) recorder_->edited(edit, source, moments_);
+  if (recorder_) recorder_->record_edit(edit, source, moments_);
   recalibration_requested_ |= command.action == scene::ActionId::repair;
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
@@ -139,14 +139,16 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   return {};
 }
 
-void Session::see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at) {
+void Session::note_tablet(const std::string& guest,
+                          const std::optional<Eigen::Vector3d>& p_eye_world,
+                          Stamp at) {
   if (p_eye_world && !p_eye_world->allFinite()) return;
   const bool goes_by_it = guest == show_state_.viewer || setup_.scene.find_tablet(guest);
   if (!tablets_.note(guest, p_eye_world, goes_by_it, at)) return;
-  if (recorder_) recorder_->saw(guest, p_eye_world, at);
+  if (recorder_) recorder_->record_tablet(guest, p_eye_world, at);
 }
 
-Status Session::show(scene::Scene scene, Stamp at) {
+Status Session::replace_scene(scene::Scene scene, Stamp at) {
   if (!is_carried_alike(setup_.scene, scene))
     return error(
         "{}: expected the markers, slots and controls that the session began with, found others. Start a "
@@ -164,7 +166,7 @@ Status Session::show(scene::Scene scene, Stamp at) {
       if (!is_in(before, name)) shown = name;
     if (!is_in(now, shown)) shown = now.front();
   }
-  if (recorder_) recorder_->shown(scene);
+  if (recorder_) recorder_->record_scene(scene);
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; the scene was loaded again");
   composer_.replace(std::move(composer));
   setup_.scene = std::move(scene);
@@ -173,8 +175,8 @@ Status Session::show(scene::Scene scene, Stamp at) {
   return {};
 }
 
-Status Session::mend(Rig rig, Stamp at) {
-  if (recorder_) rig = recorder_->mended(std::move(rig), moments_);
+Status Session::replace_rig(Rig rig, Stamp at) {
+  if (recorder_) rig = recorder_->record_rig(std::move(rig), moments_);
   LIMN_TRY(FrameComposer composer, FrameComposer::create(setup_.scene, rig, setup_.paint));
   composer_.replace(std::move(composer));
   setup_.rig = std::move(rig);
@@ -184,10 +186,10 @@ Status Session::mend(Rig rig, Stamp at) {
   return {};
 }
 
-void Session::show_news(SceneWatch* files, Stamp at) {
+void Session::reload_changed_scene(SceneWatch* files, Stamp at) {
   auto news = files->news();
   if (!news) return;
-  const Status shown = *news ? show_if_whole(std::move(**news), at) : Status(news->error());
+  const Status shown = *news ? replace_scene_if_complete(std::move(**news), at) : Status(news->error());
   if (shown) return;
   const std::string what = shown.message() + " The parts stay as they were.";
   warn(at, what);
@@ -195,77 +197,77 @@ void Session::show_news(SceneWatch* files, Stamp at) {
 
 // Shows the new scene, unless a variant that the session has cannot be loaded any more. A variant that never
 // could be loaded is only reported.
-Status Session::show_if_whole(SceneNews news, Stamp at) {
+Status Session::replace_scene_if_complete(SceneNews news, Stamp at) {
   for (const scene::SkippedVariant& skipped_variants : news.skipped_variants) {
     const scene::Slot* slot = setup_.scene.find_slot(skipped_variants.slot);
     if (!slot) continue;
     for (const std::string& name : variant_names(*slot))
       if (name == skipped_variants.variant) return error("{}", skipped_variants.why);
   }
-  LIMN_TRY_STATUS(show(std::move(news.scene), at));
-  tell(news.skipped_variants, at, telemetry_);
+  LIMN_TRY_STATUS(replace_scene(std::move(news.scene), at));
+  report_skipped(news.skipped_variants, at, telemetry_);
   return {};
 }
 
 FrameInput Session::predict(const FrameTimes& times) {
-  prediction_.at_light = predicted_at_light(watched_, setup_.paint, times);
-  return {watched_, show_state_, times, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_light),
-          tablets_.places()};
+  prediction_.at_light = predicted_at_light(percepts_, setup_.paint, times);
+  return {percepts_, show_state_, times,
+          scene::assign_tracks(setup_.scene, show_state_, prediction_.at_light), tablets_.places()};
 }
 
 const ComposedFrame& Session::compose(const FrameInput& input) {
   const auto begun = std::chrono::steady_clock::now();
   if (const auto news = composer_.compose(input, setup_)) warn(input.times.now, *news);
   paint_ms_ = milliseconds_since(begun);
-  return painted();
+  return composed();
 }
 
 void Session::record_frame() {
   const auto begun = std::chrono::steady_clock::now();
-  if (recorder_) recorder_->painted(painted(), moments_);
+  if (recorder_) recorder_->record_images(composed(), moments_);
   record_ms_ = recorder_ ? milliseconds_since(begun) : -1;
 }
 
-const ComposedFrame& Session::paint(Stamp now, Stamp shown_at) {
+const ComposedFrame& Session::compose_and_record(Stamp now, Stamp shown_at) {
   compose(predict({now, shown_at}));
   record_frame();
-  return painted();
+  return composed();
 }
 
-void Session::look_for_drift(Stamp now) {
+void Session::check_drift(Stamp now) {
   FrameComposer* composer = composer_.composer();
   if (!composer) return;
-  composer->look_for_drift(watched_);
+  composer->check_drift(percepts_);
   if (const auto news = drift_.news(composer->drift())) warn(now, *news);
 }
 
-void Session::tell_unwritten(Stamp at) {
+void Session::report_unwritten(Stamp at) {
   for (const std::string& what : store_.failures()) warn(at, what);
 }
 
 ShownFrame Session::measured() const {
-  const ComposedFrame& painted = composer_.painted();
-  ShownFrame out{.captured_at = watched_.captured_at,
-                 .shown_at = painted.shown_at,
-                 .detect_ms = watched_.detect_ms,
-                 .filter_ms = watched_.filter_ms,
+  const ComposedFrame& composed = composer_.composed();
+  ShownFrame out{.captured_at = percepts_.captured_at,
+                 .shown_at = composed.shown_at,
+                 .detect_ms = percepts_.detect_ms,
+                 .filter_ms = percepts_.filter_ms,
                  .paint_ms = paint_ms_,
                  .screen_ms = -1,
                  .record_ms = record_ms_};
-  for (const auto& detections : watched_.detections) out.markers += static_cast<int>(detections.size());
-  for (const Track& track : painted.tracks)
+  for (const auto& detections : percepts_.detections) out.markers += static_cast<int>(detections.size());
+  for (const Track& track : composed.tracks)
     out.lost += track.tracking == TrackingState::lost && !scene::is_loose_body(track.body);
   return out;
 }
 
 cv::Mat Session::free_surface(std::size_t projector) {
   FrameComposer* composer = composer_.composer();
-  return composer && painted().posed.world_from_prototype ? composer->free_surface(projector) : cv::Mat();
+  return composer && composed().posed.world_from_prototype ? composer->free_surface(projector) : cv::Mat();
 }
 
 cv::Mat Session::screen(scene::Screen what) {
   FrameComposer* composer = composer_.composer();
-  return composer ? composer->screen(watched_, prediction_.at_image, show_state_, what) : cv::Mat();
+  return composer ? composer->screen(percepts_, prediction_.at_image, show_state_, what) : cv::Mat();
 }
 
 }  // namespace limn::apps

@@ -34,7 +34,7 @@ struct Edited {
 };
 
 /// Reports variants that could not be loaded. `telemetry` may be null.
-void tell(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry);
+void report_skipped(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry);
 
 /// A live session: makes images from percepts and from what people change. Belongs to the thread whose GL
 /// context is current.
@@ -54,36 +54,36 @@ class Session {
 
   /// Receives new percepts; their control uses become edits. `moments`: number of calls of Perception::watch
   /// so far.
-  void take(Percepts watched, std::size_t moments);
+  void update_percepts(Percepts percepts, std::size_t moments);
   /// Applies an edit. Error, and nothing changes: it cannot be done. `source` says who sent it. `pair`
   /// without a marker uses the last one of waiting_markers().
   Status edit(const scene::Edit& edit, const std::string& source, Stamp at);
 
   /// Updates the position of a guest's tablet (world frame, m); nullopt: its window is closed. The viewpoint
   /// depends on it while ShowState::viewer names the guest, or the guest is among the scene's viewers.
-  void see(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
+  void note_tablet(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
 
   /// Shows another scene from now on, with the same markers and controls, but with parts that were edited,
   /// added or removed. A new variant is shown at once. Error, and nothing changes: markers or controls
   /// differ, or the scene cannot be drawn.
-  Status show(scene::Scene scene, Stamp at);
+  Status replace_scene(scene::Scene scene, Stamp at);
 
   /// Continues with another rig of the same devices. Error: no renderer can be made for it; the session keeps
   /// its rig.
-  Status mend(Rig rig, Stamp at);
+  Status replace_rig(Rig rig, Stamp at);
   /// Whether somebody asked for a repair (session/live_recalibration.h) since the last call.
   bool take_recalibration_request() { return std::exchange(recalibration_requested_, false); }
   /// The progress of a repair in words; empty: none is running.
   const std::string& recalibration_progress() const { return recalibration_progress_; }
   void set_recalibration_progress(std::string how_far) { recalibration_progress_ = std::move(how_far); }
   /// The drift that was last reported.
-  const std::optional<Drift>& drift() const { return drift_.told(); }
+  const std::optional<Drift>& drift() const { return drift_.reported(); }
   /// Adds a message to the telemetry and to the log.
   void warn(Stamp at, const std::string& what);
 
   /// Shows the scene from `files` if it has changed, as show() does. If it cannot be loaded, this is reported
   /// and the parts stay as they were.
-  void show_news(SceneWatch* files, Stamp at);
+  void reload_changed_scene(SceneWatch* files, Stamp at);
 
   /// The input for the frame with these times. Bodies are predicted to them here and nowhere else.
   FrameInput predict(const FrameTimes& times);
@@ -92,11 +92,11 @@ class Session {
   /// Adds the composed frame to the recording, if there is one.
   void record_frame();
   /// predict(), compose() and record_frame() in one call, for callers that show nothing.
-  const ComposedFrame& paint(Stamp now, Stamp shown_at);
+  const ComposedFrame& compose_and_record(Stamp now, Stamp shown_at);
   /// To be called when the composed frame is shown: checks whether a device has moved, and reports it.
-  void look_for_drift(Stamp now);
+  void check_drift(Stamp now);
   /// Reports looks, pairings and units that could not be written.
-  void tell_unwritten(Stamp at);
+  void report_unwritten(Stamp at);
   /// Whether looks, pairings or units are not on the disk yet.
   bool is_writing() const { return store_.is_busy(); }
   /// Waits until they are on the disk.
@@ -108,9 +108,9 @@ class Session {
   cv::Mat free_surface(std::size_t projector);
 
   /// The last composed frame.
-  const ComposedFrame& painted() const { return composer_.painted(); }
+  const ComposedFrame& composed() const { return composer_.composed(); }
   const scene::ShowState& show_state() const { return show_state_; }
-  const Percepts& watched() const { return watched_; }
+  const Percepts& percepts() const { return percepts_; }
   /// The predicted tracks, for the newest frames and the newest predict().
   const Prediction& prediction() const { return prediction_; }
   const SessionSetup& setup() const { return setup_; }
@@ -127,7 +127,7 @@ class Session {
  private:
   Session(
       SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder, bool keeps_looks);
-  Status show_if_whole(SceneNews news, Stamp at);
+  Status replace_scene_if_complete(SceneNews news, Stamp at);
   void ask_units();
 
   SessionSetup setup_;
@@ -137,7 +137,7 @@ class Session {
   Recorder* recorder_;
   std::set<std::string> asked_;  // questions about units, each asked once
   scene::ShowState show_state_;
-  Percepts watched_;
+  Percepts percepts_;
   Prediction prediction_;
   std::size_t moments_ = 0;
   DriftNotices drift_;

@@ -27,10 +27,10 @@ class SessionClient {
   virtual ~SessionClient() = default;
 
   /// Called before a frame is composed: sends the client's edits to the session.
-  virtual void hear(const SessionMoment& moment) = 0;
+  virtual void apply_edits(const SessionMoment& moment) = 0;
   /// Called after a frame was shown, and during a recalibration, when no frame can be shown: the client gets
   /// what has changed.
-  virtual void tell(const SessionMoment& moment) = 0;
+  virtual void publish_state(const SessionMoment& moment) = 0;
 
   /// Overlays for the projected light only: recorded and reported images are without them.
   virtual std::vector<Overlay> overlays(Session*) { return {}; }

@@ -42,38 +42,38 @@ Result<SessionOutput> SessionOutput::open(const std::filesystem::path& out,
   return output;
 }
 
-void SessionOutput::shown(const ShownFrame& frame, const ComposedFrame& painted) {
+void SessionOutput::add_frame(const ShownFrame& frame, const ComposedFrame& composed) {
   telemetry_.add(frame);
-  if (poses_.is_open()) add_poses(painted);
-  if (const auto news = poses_.news()) telemetry_.note(painted.shown_at, *news);
+  if (poses_.is_open()) add_poses(composed);
+  if (const auto news = poses_.news()) telemetry_.note(composed.shown_at, *news);
   if (!recorder_ || told_of_recording_) return;
   const auto ended = recorder_->ended();
   if (!ended) return;
   told_of_recording_ = true;
-  telemetry_.note(painted.shown_at, "the recording ended: " + *ended);
-  log_warning("live: the recording ended at {:.2f} s: {}. The session goes on.", seconds_of(painted.shown_at),
-              *ended);
+  telemetry_.note(composed.shown_at, "the recording ended: " + *ended);
+  log_warning("live: the recording ended at {:.2f} s: {}. The session goes on.",
+              seconds_of(composed.shown_at), *ended);
 }
 
 // Poses are in the prototype's frame if it has a pose, otherwise in the world frame.
-void SessionOutput::add_poses(const ComposedFrame& painted) {
+void SessionOutput::add_poses(const ComposedFrame& composed) {
   const Pose from_world =
-      painted.posed.world_from_prototype ? painted.posed.world_from_prototype->inverse() : Pose{};
-  for (const scene::PosedPart& part : painted.posed.parts) {
+      composed.posed.world_from_prototype ? composed.posed.world_from_prototype->inverse() : Pose{};
+  for (const scene::PosedPart& part : composed.posed.parts) {
     const Pose pose = from_world * part.world_from_part;
     const Eigen::Vector3d mm = 1e3 * pose.translation;
     const Eigen::Quaterniond& q = pose.rotation;
     poses_.add(fmt::format("{:.6f},{},{},{:.4f},{:.4f},{:.4f},{:.8f},{:.8f},{:.8f},{:.8f}\n",
-                           seconds_of(painted.shown_at), part.slot, part.variant, mm.x(), mm.y(), mm.z(),
+                           seconds_of(composed.shown_at), part.slot, part.variant, mm.x(), mm.y(), mm.z(),
                            q.w(), q.x(), q.y(), q.z()),
-               painted.shown_at);
+               composed.shown_at);
   }
 }
 
 Status SessionOutput::close(Session* session, bool as_json) {
   poses_.flush();
   session->finish_writing();
-  session->tell_unwritten(session->painted().shown_at);
+  session->report_unwritten(session->composed().shown_at);
   const Status recorded = recorder_ ? recorder_->finish() : Status();
   nlohmann::ordered_json json = {{"schema", "limn.live/1"}};
   json.update(telemetry_.summary());
@@ -88,7 +88,7 @@ Status SessionOutput::close(Session* session, bool as_json) {
 // Writes the files that a session leaves in its folder.
 Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& json) const {
   if (out_.empty()) return {};
-  const std::vector<cv::Mat>& images = session->painted().projectors;
+  const std::vector<cv::Mat>& images = session->composed().projectors;
   for (std::size_t i = 0; i < images.size(); ++i)
     LIMN_TRY_STATUS(
         write_png(out_ / ("projector-" + session->setup().rig.projectors[i].name + ".png"), images[i]));

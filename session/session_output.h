@@ -27,14 +27,14 @@ class SessionOutput {
   const std::filesystem::path& out() const { return out_; }  ///< empty: none
 
   /// To be called for each shown frame. Reports once if the recording has ended.
-  void shown(const ShownFrame& frame, const ComposedFrame& painted);
+  void add_frame(const ShownFrame& frame, const ComposedFrame& composed);
 
   /// Waits for the recording; writes session.json, session.html, the last images; prints the summary.
   Status close(Session* session, bool as_json);
 
  private:
   explicit SessionOutput(Telemetry telemetry) : telemetry_(std::move(telemetry)) {}
-  void add_poses(const ComposedFrame& painted);
+  void add_poses(const ComposedFrame& composed);
   Status write_end(Session* session, const nlohmann::ordered_json& json) const;
 
   std::filesystem::path out_;

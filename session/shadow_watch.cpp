@@ -13,10 +13,10 @@ constexpr int k_patch_px = 8;
 
 ShadowWatch::ShadowWatch(const Rig& rig) : rig_(rig), arriving_(rig), seen_at_(rig.cameras.size()) {}
 
-void ShadowWatch::look(const Percepts& watched,
-                       const scene::PosedScene& posed,
-                       const ProjectionHistory& shown,
-                       projector::Renderer* renderer) {
+void ShadowWatch::update(const Percepts& percepts,
+                         const scene::PosedScene& posed,
+                         const ProjectionHistory& shown,
+                         projector::Renderer* renderer) {
   if (!posed.world_from_prototype) return;
   if (!placed_ || is_elsewhere(*placed_, *posed.world_from_prototype)) {
     placed_ = posed.world_from_prototype;
@@ -24,8 +24,8 @@ void ShadowWatch::look(const Percepts& watched,
       arriving_.place(i, renderer->illuminated_patches(i, posed, k_patch_px));
   }
   bool has_changed = false;
-  for (std::size_t i = 0; i < watched.frames.size(); ++i) {
-    const Frame& frame = watched.frames[i];
+  for (std::size_t i = 0; i < percepts.frames.size(); ++i) {
+    const Frame& frame = percepts.frames[i];
     if (frame.image.empty() || frame.captured_at <= seen_at_[i]) continue;
     seen_at_[i] = frame.captured_at;
     if (const auto* images = shown.at(frame.captured_at))

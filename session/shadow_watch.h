@@ -20,10 +20,10 @@ class ShadowWatch {
 
   /// Processes new frames, and sets in the renderer how much of each projector's light arrives. Does nothing
   /// without a prototype in `posed`.
-  void look(const Percepts& watched,
-            const scene::PosedScene& posed,
-            const ProjectionHistory& shown,
-            projector::Renderer* renderer);
+  void update(const Percepts& percepts,
+              const scene::PosedScene& posed,
+              const ProjectionHistory& shown,
+              projector::Renderer* renderer);
 
  private:
   Rig rig_;

@@ -18,7 +18,7 @@ double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
 
 // RMS distance (mm, on the prototype) of the parts' origins from their true positions when the light arrives;
 // -1 when no part is shown.
-double placement_mm(const ComposedFrame& painted,
+double placement_mm(const ComposedFrame& composed,
                     const Session& session,
                     const ScriptedRoom& room,
                     const sim::World& world) {
@@ -30,7 +30,7 @@ double placement_mm(const ComposedFrame& painted,
   };
   const scene::Scene& scene = session.setup().scene;
   if (scene.prototype) add("prototype", world.world_from_prototype);
-  const double at_s = seconds_of(painted.shown_at);
+  const double at_s = seconds_of(composed.shown_at);
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const MarkerName& marker = scene::slot_marker(scene, session.show_state(), i);
     if (sim::world_from_marker(world, marker)) add(scene.slots[i].name, room.world_from_marker(marker, at_s));
@@ -41,10 +41,10 @@ double placement_mm(const ComposedFrame& painted,
   };
   double sum = 0;
   int count = 0;
-  for (const scene::PosedPart& part : painted.posed.parts) {
+  for (const scene::PosedPart& part : composed.posed.parts) {
     for (const scene::PosedPart& other : right.parts) {
       if (other.slot != part.slot) continue;
-      const Eigen::Vector3d off = base(painted.posed) * part.world_from_part.translation -
+      const Eigen::Vector3d off = base(composed.posed) * part.world_from_part.translation -
                                   base(right) * other.world_from_part.translation;
       sum += off.squaredNorm();
       ++count;
@@ -91,9 +91,9 @@ class VirtualSource final : public FrameSource {
     out.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
     if (frames.empty()) return out;
     const auto begun = std::chrono::steady_clock::now();
-    if (recorder_) recorder_->watched(frames);
+    if (recorder_) recorder_->record_frames(frames);
     out.record_ms = milliseconds_since(begun);
-    out.watched = perception_->watch(frames);
+    out.percepts = perception_->watch(frames);
     out.moments = ++moments_;
     return out;
   }
@@ -151,17 +151,17 @@ class VirtualSink final : public FrameSink {
       projectors_.push_back(health->add({projector.name, "projector"}));
   }
 
-  Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) override {
+  Status show(const ComposedFrame& composed, const std::vector<cv::Mat>& light) override {
     for (std::size_t i = 0; i < light.size(); ++i) {
       if (!is_there(i)) continue;
       LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(light[i]));
-      LIMN_CHECK(shown_at == painted.shown_at);
+      LIMN_CHECK(shown_at == composed.shown_at);
     }
     return {};
   }
 
-  double placement_mm(const ComposedFrame& painted) const override {
-    return apps::placement_mm(painted, *session_, *room_, rig_->world());
+  double placement_mm(const ComposedFrame& composed) const override {
+    return apps::placement_mm(composed, *session_, *room_, rig_->world());
   }
 
  private:

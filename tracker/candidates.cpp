@@ -44,7 +44,7 @@ bool is_full(const Contours::Extent& contour, const Contours::Box& box, double m
 
 void QuadFinder::find(CornerCodes& corners,
                       const CandidateOptions& options,
-                      const std::function<void(const Quad&)>& tell) {
+                      const std::function<void(const Quad&)>& on_quad) {
   contours_.for_each(corners, [&](const Contours::Extent& contour) {
     if (!is_large(contour, options.min_side_px)) return;
     if (!is_full(contour, contours_.box(), options.min_side_px)) return;
@@ -56,7 +56,7 @@ void QuadFinder::find(CornerCodes& corners,
       for (std::size_t to = 0; to < count; ++to) sides_[from][to].known = false;
     }
     Quad quad;
-    if (choose_quad(options.min_side_px, &quad)) tell(quad);
+    if (choose_quad(options.min_side_px, &quad)) on_quad(quad);
   });
 }
 

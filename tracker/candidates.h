@@ -25,10 +25,10 @@ struct CandidateOptions {
 /// Finds the outlines of black regions that four straight lines describe. Holds its buffers between calls.
 class QuadFinder {
  public:
-  /// Calls tell(quad) for each quadrilateral when it is found. Sets the visited bits of `corners`.
+  /// Calls on_quad(quad) for each quadrilateral when it is found. Sets the visited bits of `corners`.
   void find(CornerCodes& corners,
             const CandidateOptions& options,
-            const std::function<void(const Quad&)>& tell);
+            const std::function<void(const Quad&)>& on_quad);
 
  private:
   struct Side {

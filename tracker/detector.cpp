@@ -150,7 +150,7 @@ class Detector::UnreadQuads {
   void end() { ended_ = true; }
 
   // Waits for the next quad; nullopt when all are taken and there will be no more.
-  std::optional<Next> take() {
+  std::optional<Next> next_quad() {
     for (;;) {
       bool ended = false;
       WorkerTeam::wait_until([&] { return (ended = ended_) || taken_ < count_; });
@@ -232,7 +232,7 @@ void Detector::find_markers(const cv::Mat& grey,
 // Reads quads until none is left.
 void Detector::read_quads(
     const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker) {
-  while (const auto next = unread.take())
+  while (const auto next = unread.next_quad())
     if (auto found = read(grey, next->quad, lens, reading, workers_[static_cast<std::size_t>(worker)])) {
       const std::lock_guard lock(unread.mutex());
       found->number = next->number;

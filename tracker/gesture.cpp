@@ -98,10 +98,10 @@ int GestureReader::read(const cv::Mat& grey, std::span<const Detection> detectio
   if (!is_seen_ && seen_at_ != Stamp{} && seconds_between(seen_at_, captured_at) > k_gap_s)
     hidden_since_ = seen_at_;
   note_neighbours(detections, captured_at);
-  return is_seen_ ? seen(grey, *found, captured_at) : hidden(grey, captured_at);
+  return is_seen_ ? update_visible(grey, *found, captured_at) : update_hidden(grey, captured_at);
 }
 
-int GestureReader::seen(const cv::Mat& grey, const Detection& detection, Stamp at) {
+int GestureReader::update_visible(const cv::Mat& grey, const Detection& detection, Stamp at) {
   if (seen_at_ == Stamp{} || seconds_between(seen_at_, at) > k_gap_s) seen_since_ = at;
   seen_at_ = at;
   corners_px_ = detection.corners_px;
@@ -116,7 +116,7 @@ int GestureReader::seen(const cv::Mat& grey, const Detection& detection, Stamp a
   return 0;
 }
 
-int GestureReader::hidden(const cv::Mat& grey, Stamp at) {
+int GestureReader::update_hidden(const cv::Mat& grey, Stamp at) {
   if (gesture_ == Gesture::turn) return 0;
   if (!is_armed_ || is_tipped_) return 0;
   const cv::Mat patch = patch_of(grey, place_);

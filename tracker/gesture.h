@@ -49,8 +49,8 @@ class GestureReader {
     Eigen::Vector2d px;
     Stamp seen_at;
   };
-  int seen(const cv::Mat& grey, const Detection& detection, Stamp at);
-  int hidden(const cv::Mat& grey, Stamp at);
+  int update_visible(const cv::Mat& grey, const Detection& detection, Stamp at);
+  int update_hidden(const cv::Mat& grey, Stamp at);
   int turned(const Detection& detection, Stamp at);
   int laid(const Detection& detection, Stamp at);
   void note_neighbours(std::span<const Detection> detections, Stamp at);

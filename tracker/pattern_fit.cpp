@@ -471,7 +471,7 @@ class PatternFit {
     for (std::size_t a = 0; a < number; ++a)
       results.derivatives[active.unknowns[a]] = &derivatives[a * stride];
     const Places places{samples.x.data(), samples.y.data(), samples.level_x.data(), samples.level_y.data()};
-    light_.see(guess_of(cells_, fitted->state, has_ground_, origin_), places, stride, results);
+    light_.evaluate(guess_of(cells_, fitted->state, has_ground_, origin_), places, stride, results);
     compare(samples.light.data(), count_, residuals.data(), sizes.data());
     const double scale = std::max(least_scale_, 1.4826 * median(sizes.data(), count_));
     // The background is one level for each side only by chance, so its residuals are weighted by their size.

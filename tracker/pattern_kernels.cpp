@@ -226,7 +226,7 @@ inline void find_edges(const Guess& guess, const Lanes& px, const Lanes& py, std
                     __builtin_fabsf(seen.by_y[i] * place.blur.y[i])) > k_edge;
 }
 
-inline void see(const Guess& guess, const Places& places, std::size_t from, const Results& results) {
+inline void evaluate(const Guess& guess, const Places& places, std::size_t from, const Results& results) {
   Lanes px, py, level_x, level_y;
   load(&places.x[from], &px);
   load(&places.y[from], &py);
@@ -301,7 +301,7 @@ inline void see(const Guess& guess, const Places& places, std::size_t from, cons
 }
 
 void see_all(const Guess& guess, const Places& places, std::size_t count, const Results& results) {
-  for (std::size_t i = 0; i < count; i += k_lanes) see(guess, places, i, results);
+  for (std::size_t i = 0; i < count; i += k_lanes) evaluate(guess, places, i, results);
 }
 
 void see_all_edges(

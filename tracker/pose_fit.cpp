@@ -76,17 +76,17 @@ Gradients gradients(const Batch& batch, std::size_t i) {
   return by_delta;
 }
 
-// Calls take(batch) for all observations, a batch at a time. False when a point has no pixel.
-template <class Take>
+// Calls use_batch(batch) for all observations, a batch at a time. False when a point has no pixel.
+template <class Use>
 bool each_batch(std::span<const PointObservation> observations,
                 const Pose& world_from_body,
                 bool with_derivatives,
-                const Take& take) {
+                const Use& use_batch) {
   Batch batch;
   for (; !observations.empty(); observations = observations.subspan(batch.observations.size())) {
     batch.observations = first_batch(observations);
     if (!project(world_from_body, with_derivatives, &batch)) return false;
-    take(batch);
+    use_batch(batch);
   }
   return true;
 }
@@ -99,11 +99,11 @@ struct Judged {
   Vector6d gradient = Vector6d::Zero();
 };
 
-void add_sight(const PointObservation& observation,
-               const Eigen::Vector2d& px,
-               const Gradients& by_delta,
-               const HuberLoss& loss,
-               Judged* judged) {
+void add_observation(const PointObservation& observation,
+                     const Eigen::Vector2d& px,
+                     const Gradients& by_delta,
+                     const HuberLoss& loss,
+                     Judged* judged) {
   const Eigen::Vector2d r = observation.px - px;
   const Eigen::Vector2d weighed = observation.information * r;
   const double square = r.dot(weighed), w = loss.weight(square);
@@ -132,7 +132,7 @@ std::optional<Judged> judged(std::span<const PointObservation> observations,
   Judged sum;
   const bool is_seen = each_batch(observations, pose, true, [&](const Batch& batch) {
     for (std::size_t i = 0; i < batch.observations.size(); ++i)
-      add_sight(batch.observations[i], batch.px[i], gradients(batch, i), loss, &sum);
+      add_observation(batch.observations[i], batch.px[i], gradients(batch, i), loss, &sum);
   });
   if (!is_seen) return std::nullopt;
   if (prior) add_prior(*prior, pose, &sum);

@@ -141,11 +141,11 @@ class Session {
   void monitor(const Traced& traced) {
     const Stamp at = shifted(Stamp{}, static_cast<double>(frames_ + 1) * k_period_s);
     history_.add(shown_, at);
-    Percepts watched;
+    Percepts percepts;
     for (std::size_t i = 0; i < traced.cameras.size(); ++i)
-      watched.frames.push_back({world_.rig.cameras[i].name,
-                                sim::photograph(world_, traced.cameras[i], shown_, seed_ + frames_), at});
-    shadows_->look(watched, posed_, history_, &*renderer_);
+      percepts.frames.push_back({world_.rig.cameras[i].name,
+                                 sim::photograph(world_, traced.cameras[i], shown_, seed_ + frames_), at});
+    shadows_->update(percepts, posed_, history_, &*renderer_);
     ++frames_;
   }
 

@@ -9,13 +9,13 @@ namespace {
 
 class Checks {
  public:
-  Checks(const calib::CaptureSet& captures, const Surroundings& surroundings, const WizardAudience& audience)
-      : captures_(captures), around_(surroundings), audience_(audience) {}
+  Checks(const calib::CaptureSet& captures, const WizardBackend& backend, const WizardListener& listener)
+      : captures_(captures), backend_(backend), listener_(listener) {}
 
   Status look_at_light() {
     step(WizardStep::outputs, WizardState::runs, "");
-    LIMN_TRY(out.light, measured_exposure(captures_, around_.stage));
-    if (audience_.lit) audience_.lit(out.light);
+    LIMN_TRY(out.light, measured_exposure(captures_, backend_.capture));
+    if (listener_.on_light) listener_.on_light(out.light);
     report_progress(
         WizardStep::outputs, unseen(out.light),
         fmt::format("{} of {} projectors seen", captures_.projectors.size() - unseen(out.light).size(),
@@ -43,13 +43,13 @@ class Checks {
       out.latency.emplace_back();
       const auto camera = best_camera(captures_.projectors[i].name);
       if (!camera) continue;
-      const auto measured = measured_latency(around_.flashes(static_cast<int>(i), *camera));
+      const auto measured = measured_latency(backend_.flashes(static_cast<int>(i), *camera));
       if (!measured) {
         problems.push_back(fmt::format("{}: {}", captures_.projectors[i].name, measured.message()));
         continue;
       }
       out.latency.back() = *measured;
-      around_.use_latency(static_cast<int>(i), measured->seconds + measured->within_s);
+      backend_.use_latency(static_cast<int>(i), measured->seconds + measured->within_s);
       words.push_back(fmt::format("{} {:.1f} ms", captures_.projectors[i].name, 1e3 * measured->seconds));
     }
     report_progress(WizardStep::latency, problems, fmt::format("{}", fmt::join(words, ", ")));
@@ -72,28 +72,28 @@ class Checks {
   }
 
   void step(WizardStep which, WizardState state, const std::string& words) {
-    if (audience_.step) audience_.step(which, state, words);
+    if (listener_.step) listener_.step(which, state, words);
   }
 
   // Ends a step: reports its problems, or else its result.
   void report_progress(WizardStep which, const std::vector<std::string>& problems, const std::string& words) {
-    for (const std::string& problem : problems) audience_.say("advice: " + problem);
-    audience_.say(fmt::format("{}: {}", to_text(which), words));
+    for (const std::string& problem : problems) listener_.say("advice: " + problem);
+    listener_.say(fmt::format("{}: {}", to_text(which), words));
     step(which, problems.empty() ? WizardState::done : WizardState::fails,
          problems.empty() ? words : fmt::format("{}", fmt::join(problems, "\n")));
   }
 
   const calib::CaptureSet& captures_;
-  const Surroundings& around_;
-  const WizardAudience& audience_;
+  const WizardBackend& backend_;
+  const WizardListener& listener_;
 };
 
 }  // namespace
 
 Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
-                                       const Surroundings& surroundings,
-                                       const WizardAudience& audience) {
-  Checks checks(captures, surroundings, audience);
+                                       const WizardBackend& backend,
+                                       const WizardListener& listener) {
+  Checks checks(captures, backend, listener);
   LIMN_TRY_STATUS(checks.look_at_light());
   LIMN_TRY_STATUS(checks.measure_latency());
   return std::move(checks.out);

@@ -20,10 +20,10 @@ struct CheckedDevices {
 };
 
 /// Lets every projector show its number, checks exposure and focus, measures the display latencies and passes
-/// them to `surroundings`. `audience` gets one line for each step. Problems are reported with advice; only a
+/// them to `backend`. `listener` gets one line for each step. Problems are reported with advice; only a
 /// device that fails is an error.
 Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
-                                       const Surroundings& surroundings,
-                                       const WizardAudience& audience);
+                                       const WizardBackend& backend,
+                                       const WizardListener& listener);
 
 }  // namespace limn::apps

@@ -31,13 +31,13 @@ cv::Vec3d light_bgr(double mm) {
 
 class Steps {
  public:
-  Steps(const PrototypeSteps& steps, const Surroundings& around, const WizardAudience& audience)
-      : steps_(steps), around_(around), audience_(audience), out_(steps.rig / "scan") {}
+  Steps(const PrototypeSteps& steps, const WizardBackend& backend, const WizardListener& listener)
+      : steps_(steps), backend_(backend), listener_(listener), out_(steps.rig / "scan") {}
 
   Result<std::optional<PrototypeSeen>> run() {
     step(WizardStep::scan, WizardState::runs, "waiting for the prototype");
-    audience_.say("scan: remove the board and put the prototype in its working position");
-    LIMN_TRY(const bool is_there, around_.stand(nullptr));
+    listener_.say("scan: remove the board and put the prototype in its working position");
+    LIMN_TRY(const bool is_there, backend_.wait_for_prototype(nullptr));
     if (!is_there) {
       for (const WizardStep skipped : {WizardStep::scan, WizardStep::align, WizardStep::paint})
         step(skipped, WizardState::waits, "skipped");
@@ -52,10 +52,10 @@ class Steps {
 
  private:
   void step(WizardStep which, WizardState state, const std::string& words) {
-    if (audience_.step) audience_.step(which, state, words);
+    if (listener_.step) listener_.step(which, state, words);
   }
   void end(WizardStep which, const std::string& words, bool is_well = true) {
-    audience_.say(fmt::format("{}: {}", to_text(which), words));
+    listener_.say(fmt::format("{}: {}", to_text(which), words));
     step(which, is_well ? WizardState::done : WizardState::fails, words);
   }
 
@@ -66,13 +66,13 @@ class Steps {
     std::error_code ignored;
     fs::remove_all(captures.folder, ignored);  // the prototype may have stood elsewhere
     LIMN_TRY_STATUS(calib::begin_captures(captures));
-    calib::CaptureBackend stage = around_.stage;
-    stage.show = [&](int projector, const cv::Mat& image) -> Status {
-      if (audience_.wish && *audience_.wish == WizardWish::leave) return error("stopped during the capture.");
-      return around_.stage.show(projector, image);
+    calib::CaptureBackend capture = backend_.capture;
+    capture.show = [&](int projector, const cv::Mat& image) -> Status {
+      if (listener_.wish && *listener_.wish == WizardWish::leave) return error("stopped during the capture.");
+      return backend_.capture.show(projector, image);
     };
-    const Status captured = calib::capture_pose(captures, 0, stage);
-    LIMN_TRY_STATUS(around_.written());
+    const Status captured = calib::capture_pose(captures, 0, capture);
+    LIMN_TRY_STATUS(backend_.wait_for_files());
     LIMN_TRY_STATUS(captured);
     step(WizardStep::scan, WizardState::runs, "measuring");
     LIMN_TRY(captures_, calib::load_captures(captures.folder));
@@ -114,9 +114,9 @@ class Steps {
     seen_.align_rms_mm = 1e3 * aligned->registration.rms_m;
     seen_.warnings.insert(seen_.warnings.end(), aligned->warnings.begin(), aligned->warnings.end());
     for (std::size_t i = 0; i < std::min(k_told, aligned->warnings.size()); ++i)
-      audience_.say("advice: " + aligned->warnings[i]);
+      listener_.say("advice: " + aligned->warnings[i]);
     if (aligned->warnings.size() > k_told)
-      audience_.say(fmt::format("advice: {} more warnings are in {}", aligned->warnings.size() - k_told,
+      listener_.say(fmt::format("advice: {} more warnings are in {}", aligned->warnings.size() - k_told,
                                 (out_ / "align.json").string()));
     end(WizardStep::align,
         fmt::format("scan and CAD differ by {:.2f} mm RMS (start: {})", *seen_.align_rms_mm, aligned->how));
@@ -189,9 +189,9 @@ class Steps {
         static_cast<double>(
             std::count_if(all_mm.begin(), all_mm.end(), [](double mm) { return mm <= calib::k_good_mm; })) /
         static_cast<double>(all_mm.size());
-    LIMN_TRY_STATUS(around_.paint(images));
+    LIMN_TRY_STATUS(backend_.show_all(images));
     for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
-      LIMN_TRY(const cv::Mat image, around_.stage.grab(static_cast<int>(i)));
+      LIMN_TRY(const cv::Mat image, backend_.capture.grab(static_cast<int>(i)));
       LIMN_TRY_STATUS(write_png(out_ / ("painted-" + rig_.cameras[i].name + ".png"), image));
     }
     end(WizardStep::paint,
@@ -201,8 +201,8 @@ class Steps {
   }
 
   const PrototypeSteps& steps_;
-  const Surroundings& around_;
-  const WizardAudience& audience_;
+  const WizardBackend& backend_;
+  const WizardListener& listener_;
   fs::path out_;
   Rig rig_;
   calib::CaptureSet captures_;
@@ -214,9 +214,9 @@ class Steps {
 }  // namespace
 
 Result<std::optional<PrototypeSeen>> prototype_seen(const PrototypeSteps& steps,
-                                                    const Surroundings& surroundings,
-                                                    const WizardAudience& audience) {
-  return Steps(steps, surroundings, audience).run();
+                                                    const WizardBackend& backend,
+                                                    const WizardListener& listener) {
+  return Steps(steps, backend, listener).run();
 }
 
 }  // namespace limn::apps

@@ -38,7 +38,7 @@ struct PrototypeSeen {
 /// painted-CAMERA.png and projector-NAME.png. nullopt: a person skipped it. If no alignment is found, this is
 /// reported, and the scan is painted. Needs a machine that can draw (device::GlContext).
 Result<std::optional<PrototypeSeen>> prototype_seen(const PrototypeSteps& steps,
-                                                    const Surroundings& surroundings,
-                                                    const WizardAudience& audience);
+                                                    const WizardBackend& backend,
+                                                    const WizardListener& listener);
 
 }  // namespace limn::apps

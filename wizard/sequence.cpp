@@ -62,21 +62,21 @@ class CaptureClock {
 // Stops with an error when a person asks to check again, to repeat or to leave.
 Status capture(const calib::CaptureSet& captures,
                int pose,
-               const Surroundings& around,
+               const WizardBackend& backend,
                const std::atomic<WizardWish>* wish,
                CaptureClock* clock) {
-  calib::CaptureBackend stage = around.stage;
-  stage.show = [&](int projector, const cv::Mat& image) -> Status {
+  calib::CaptureBackend capture = backend.capture;
+  capture.show = [&](int projector, const cv::Mat& image) -> Status {
     const WizardWish now = wish ? wish->load() : WizardWish::none;
     if (now == WizardWish::check || now == WizardWish::repeat || now == WizardWish::leave)
       return error("calibrate: stopped in pose {}.", pose);
     clock->showing(projector);
-    return around.stage.show(projector, image);
+    return backend.capture.show(projector, image);
   };
   clock->stop();
-  Status done = calib::capture_pose(captures, pose, stage);
+  Status done = calib::capture_pose(captures, pose, capture);
   clock->stop();
-  const Status written = around.written();
+  const Status written = backend.wait_for_files();
   return done ? written : done;
 }
 
@@ -125,12 +125,12 @@ class FaultTeller {
 // One run of the wizard, pose by pose.
 class Run {
  public:
-  Run(const calib::CaptureSet& captures, const Surroundings& around, const WizardAudience& audience)
+  Run(const calib::CaptureSet& captures, const WizardBackend& backend, const WizardListener& listener)
       : captures_(captures),
-        around_(around),
-        audience_(audience),
-        faults_(audience.say),
-        clock_(captures.projectors.size(), around.now) {}
+        backend_(backend),
+        listener_(listener),
+        faults_(listener.say),
+        clock_(captures.projectors.size(), backend.now) {}
 
   Status pose(int number, const std::string& place) {
     const calib::CapturedPose files = files_of(captures_, number);
@@ -139,16 +139,16 @@ class Run {
     judged.before = is_complete(files);
     if (!judged.before) {
       const double before_s = clock_.total();
-      LIMN_TRY_STATUS(take(number, place, files));
+      LIMN_TRY_STATUS(capture_pose(number, place, files));
       judged.capture_s = clock_.total() - before_s;
     }
-    if (audience_.judges) audience_.judges(number);
+    if (listener_.judges) listener_.judges(number);
     LIMN_TRY_STATUS(observe(files));
     judge(&judged);
-    audience_.say(line_of(judged));
+    listener_.say(line_of(judged));
     const auto faults = judged.assessment ? judged.assessment->faults : calib::unsolved_faults(*observed_);
     faults_.report_progress(faults);
-    if (audience_.judged) audience_.judged(judged, observed_->observations, faults);
+    if (listener_.judged) listener_.judged(judged, observed_->observations, faults);
     return {};
   }
 
@@ -166,12 +166,12 @@ class Run {
  private:
   bool followed(WizardWish wish) {
     const WizardWish wanted = wish;
-    if (!audience_.wish || !audience_.wish->compare_exchange_strong(wish, WizardWish::none)) return false;
+    if (!listener_.wish || !listener_.wish->compare_exchange_strong(wish, WizardWish::none)) return false;
     are_checked_ &= wanted != WizardWish::check;
     return true;
   }
 
-  bool is_left() const { return audience_.wish && *audience_.wish == WizardWish::leave; }
+  bool is_left() const { return listener_.wish && *listener_.wish == WizardWish::leave; }
   static Status left_in(const calib::CapturedPose& files) {
     return error(
         "calibrate: left in {}. The captured images are kept; the same command continues from there.",
@@ -179,12 +179,12 @@ class Run {
   }
 
   void step(WizardStep which, WizardState state, const std::string& words) {
-    if (audience_.step) audience_.step(which, state, words);
+    if (listener_.step) listener_.step(which, state, words);
   }
 
   // Checks the devices, once in a run; their latencies are stored beside the captures.
   Status check() {
-    LIMN_TRY(const CheckedDevices checked, checked_devices(captures_, around_, audience_));
+    LIMN_TRY(const CheckedDevices checked, checked_devices(captures_, backend_, listener_));
     are_checked_ = true;
     ordered_json json = {{"schema", "limn.latency/1"}, {"projectors", ordered_json::array()}};
     for (std::size_t i = 0; i < checked.latency.size(); ++i)
@@ -196,19 +196,19 @@ class Run {
   }
 
   // Captures a pose, again from its first image each time that a person asks for it.
-  Status take(int number, const std::string& place, const calib::CapturedPose& files) {
+  Status capture_pose(int number, const std::string& place, const calib::CapturedPose& files) {
     for (bool is_again = true; is_again;) {
-      audience_.say(
+      listener_.say(
           fmt::format("{}: hold the board as follows in the first camera's image: {}", files.name, place));
-      if (audience_.aims) audience_.aims(number);
+      if (listener_.aims) listener_.aims(number);
       step(WizardStep::board, WizardState::runs, files.name);
       remove_images(files);
-      if (const Status held = around_.hold(number, nullptr); !held) {
+      if (const Status held = backend_.wait_for_board(number, nullptr); !held) {
         if (followed(WizardWish::check) || followed(WizardWish::repeat)) continue;
         return is_left() ? left_in(files) : held;
       }
       if (!are_checked_) LIMN_TRY_STATUS(check());
-      const Status done = capture(captures_, number, around_, audience_.wish, &clock_);
+      const Status done = capture(captures_, number, backend_, listener_.wish, &clock_);
       if (is_left()) return left_in(files);
       is_again = followed(WizardWish::check) || followed(WizardWish::repeat);
       if (!is_again) LIMN_TRY_STATUS(done);
@@ -233,8 +233,8 @@ class Run {
   }
 
   const calib::CaptureSet& captures_;
-  const Surroundings& around_;
-  const WizardAudience& audience_;
+  const WizardBackend& backend_;
+  const WizardListener& listener_;
   FaultTeller faults_;
   bool are_checked_ = false;  // whether the devices are
   CaptureClock clock_;
@@ -282,14 +282,14 @@ Result<Calibrated> calibrated(const WizardOptions& options,
                               const std::string& plan_json,
                               const calib::CaptureSet& captures,
                               const std::vector<std::string>& places,
-                              const Surroundings& surroundings,
-                              const WizardAudience& audience) {
+                              const WizardBackend& backend,
+                              const WizardListener& listener) {
   const auto begun = std::chrono::steady_clock::now();
   const int count = static_cast<int>(places.size());
   LIMN_TRY_STATUS(open_captures(captures, plan_json));
-  Run run(captures, surroundings, audience);
+  Run run(captures, backend, listener);
   const auto solved_all = [&] {
-    if (audience.step) audience.step(WizardStep::solve, WizardState::runs, "");
+    if (listener.step) listener.step(WizardStep::solve, WizardState::runs, "");
     return solve_all(options, captures, count);
   };
   std::optional<calib::Report> report;
@@ -309,10 +309,10 @@ Result<Calibrated> calibrated(const WizardOptions& options,
   LIMN_TRY(const auto latency_s, kept_latencies(captures.folder / k_latency));
   LIMN_TRY_STATUS(add_to_rig(latency_s, options.out));
   Calibrated done{run.poses(), std::move(*report), run.capture_s(), latency_s, std::nullopt, ""};
-  if (audience.solved) audience.solved(done.report);
-  if (options.scan && surroundings.stand) {
+  if (listener.solved) listener.solved(done.report);
+  if (options.scan && backend.wait_for_prototype) {
     auto seen = prototype_seen({options.out, options.scene, captures, done.report.assessment.error_maps},
-                               surroundings, audience);
+                               backend, listener);
     if (seen)
       done.prototype = std::move(*seen);
     else

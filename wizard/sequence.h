@@ -38,7 +38,7 @@ struct Calibrated {
 };
 
 /// Runs the wizard. Each pose of `captures` (planned; its folder is options.out / "captures", new or partly
-/// filled) is captured unless it is already there, then decoded, solved and judged; `audience` gets one line
+/// filled) is captured unless it is already there, then decoded, solved and judged; `listener` gets one line
 /// for each. The devices are checked before the first capture (wizard/device_checks.h). At the end the rig is
 /// solved as limn solve does it. `places`: for each pose, where to hold the board, as text. Captures of
 /// another plan are an error that says what differs; `plan_json` describes this plan. After a failure, the
@@ -47,7 +47,7 @@ Result<Calibrated> calibrated(const WizardOptions& options,
                               const std::string& plan_json,
                               const calib::CaptureSet& captures,
                               const std::vector<std::string>& places,
-                              const Surroundings& surroundings,
-                              const WizardAudience& audience);
+                              const WizardBackend& backend,
+                              const WizardListener& listener);
 
 }  // namespace limn::apps

@@ -21,10 +21,10 @@ std::string to_text(WizardStep step);
 enum class WizardState { waits, runs, done, fails };
 
 /// Functions that the wizard calls while it works; all except `say` may be empty.
-struct WizardAudience {
+struct WizardListener {
   std::function<void(const std::string& line)> say;
   std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
-  std::function<void(const std::vector<ExposureReading>&)> lit = nullptr;
+  std::function<void(const std::vector<ExposureReading>&)> on_light = nullptr;
   std::function<void(int pose)> aims = nullptr;                ///< the capture of a pose begins
   std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved
   std::function<void(int pose)> judges = nullptr;              ///< decoding and judging of a pose begin

@@ -194,15 +194,15 @@ cv::Mat links_of(const RangeView& view, const Ranges& ranges, double max_inciden
 // Removes pixels beside a step in depth, which see both sides: their code is of one, the other, or neither.
 int drop_edges(const cv::Mat& links, Ranges* ranges) {
   cv::Mat edge(links.size(), CV_8U, cv::Scalar(0));
-  const auto look = [&](cv::Point a, cv::Point b) {
+  const auto mark_step = [&](cv::Point a, cv::Point b) {
     const bool step = !std::isnan(ranges->range.at<double>(a)) && !std::isnan(ranges->range.at<double>(b)) &&
                       !linked(links, a, b);
     if (step) edge.at<std::uint8_t>(a) = edge.at<std::uint8_t>(b) = 1;
   };
   for (int y = 0; y < links.rows; ++y) {
     for (int x = 0; x < links.cols; ++x) {
-      if (x + 1 < links.cols) look({x, y}, {x + 1, y});
-      if (y + 1 < links.rows) look({x, y}, {x, y + 1});
+      if (x + 1 < links.cols) mark_step({x, y}, {x + 1, y});
+      if (y + 1 < links.rows) mark_step({x, y}, {x, y + 1});
     }
   }
   ranges->range.setTo(k_no_range, edge);

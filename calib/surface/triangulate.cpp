@@ -15,11 +15,11 @@ constexpr double k_parallel = 1e-6;  // sin² of 0.06 degrees
 using Jacobian = Eigen::Matrix<double, 2, 3, Eigen::RowMajor>;
 
 // Residual and derivatives of one imager, in standard deviations.
-bool look(const Imager& imager,
-          const MeasuredPixel& measured,
-          const Eigen::Vector3d& p_world,
-          Eigen::Vector2d* residual,
-          Jacobian* per_point) {
+bool ray_residual(const Imager& imager,
+                  const MeasuredPixel& measured,
+                  const Eigen::Vector3d& p_world,
+                  Eigen::Vector2d* residual,
+                  Jacobian* per_point) {
   Eigen::Vector2d px;
   Jacobian per_imager_point;
   const Eigen::Vector3d p = imager.imager_from_world * p_world;
@@ -57,8 +57,8 @@ std::optional<Triangulated> triangulate(const Imager& a,
   Eigen::Vector2d residual_a, residual_b;
   Jacobian j_a, j_b;
   for (int step = 0; step < k_most_steps; ++step) {
-    if (!look(a, px_a, found.p_world, &residual_a, &j_a)) return std::nullopt;
-    if (!look(b, px_b, found.p_world, &residual_b, &j_b)) return std::nullopt;
+    if (!ray_residual(a, px_a, found.p_world, &residual_a, &j_a)) return std::nullopt;
+    if (!ray_residual(b, px_b, found.p_world, &residual_b, &j_b)) return std::nullopt;
     const Eigen::Matrix3d information = j_a.transpose() * j_a + j_b.transpose() * j_b;
     const Eigen::LLT<Eigen::Matrix3d> factored(information);
     if (factored.info() != Eigen::Success) return std::nullopt;

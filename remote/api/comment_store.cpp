@@ -37,7 +37,7 @@ std::optional<HttpResponse> CommentStore::add(const AuthSessions::Guest& guest,
     return error_response(k_http_unavailable,
                           fmt::format("the project keeps {} comments at most.", all.size()));
   all.push_back(std::move(*comment));
-  const bool is_queued = worker_->take(
+  const bool is_queued = worker_->add_job(
       [post = post_, all, saved = std::move(saved), path = news->scene->folder / k_comments_file] {
         const Status status = scene::save_comments(path, all);
         post([saved, why = status ? "" : status.message()] { saved(why); });

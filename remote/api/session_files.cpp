@@ -45,7 +45,7 @@ SessionFiles::SessionFiles(WorkerThread* worker)
       thumbnails_(std::make_shared<Thumbnails>()) {}
 
 void SessionFiles::respond_from_worker(std::function<HttpResponse()> job, ResponseCallback respond) {
-  if (!worker_->take([job = std::move(job), respond] { respond(job()); }))
+  if (!worker_->add_job([job = std::move(job), respond] { respond(job()); }))
     respond(error_response(k_http_unavailable, "too many pictures are asked for at once."));
 }
 

@@ -35,10 +35,10 @@ SessionState::Slot slot_state(const apps::Session& session, std::size_t index) {
   }
   out.nudge_mm = 1e3 * staged.nudge;
   out.is_held = staged.pin || !staged.nudge.isZero();
-  out.tracking = tracking_name(session.painted().tracks, slot.name);
+  out.tracking = tracking_name(session.composed().tracks, slot.name);
   out.marker = scene::slot_marker(scene, session.show_state(), index).text();
   out.material = scene::format_material_override(staged.material);
-  const scene::PosedScene& posed = session.painted().posed;
+  const scene::PosedScene& posed = session.composed().posed;
   const Pose from_world = posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
   for (const scene::PosedPart& part : posed.parts)
     if (part.slot == slot.name) out.prototype_from_part = from_world * part.world_from_part;
@@ -81,7 +81,7 @@ SessionState session_state(const apps::Session& session,
   const scene::ShowState& show_state = session.show_state();
   SessionState out;
   for (std::size_t i = 0; i < scene.slots.size(); ++i) out.slots.push_back(slot_state(session, i));
-  if (scene.prototype) out.prototype = tracking_name(session.painted().tracks, "prototype");
+  if (scene.prototype) out.prototype = tracking_name(session.composed().tracks, "prototype");
   for (const scene::Look& look : show_state.looks) out.looks.push_back(look.name);
   out.look = show_state.look;
   out.other_look = show_state.other_look;
@@ -96,12 +96,12 @@ SessionState session_state(const apps::Session& session,
   out.outputs = show_state.screens;
   out.light = light_text(scene, show_state);
   out.viewer = show_state.viewer;
-  out.follows = session.painted().follows;
+  out.follows = session.composed().follows;
   out.repair = session.recalibration_progress();
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
-  for (const apps::LooseMarker& loose : apps::waiting_markers(scene, show_state, session.watched()))
+  for (const apps::LooseMarker& loose : apps::waiting_markers(scene, show_state, session.percepts()))
     out.waiting.push_back(loose.marker.text());
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, begun_at);

@@ -456,7 +456,7 @@ void TabletView::update_session(const apps::Session& session) {
     impl_->session_rig = std::make_shared<Rig>(session.setup().rig);
     impl_->session_scenes = session.scenes();
   }
-  const apps::Percepts& watched = session.watched();
+  const apps::Percepts& percepts = session.percepts();
   auto snapshot = std::make_shared<SessionSnapshot>(
       SessionSnapshot{.scene = impl_->session_scene,
                       .rig = impl_->session_rig,
@@ -464,8 +464,8 @@ void TabletView::update_session(const apps::Session& session) {
                       .show_state = session.show_state(),
                       .tracks = session.prediction().at_image,
                       .paint = session.setup().paint,
-                      .room = watched.frames.empty() ? Frame{} : watched.frames[0],
-                      .follows = session.painted().follows});
+                      .room = percepts.frames.empty() ? Frame{} : percepts.frames[0],
+                      .follows = session.composed().follows});
   const std::lock_guard lock(impl_->mutex);
   impl_->newest_snapshot = std::move(snapshot);
 }

@@ -102,8 +102,8 @@ std::vector<Shot> shots(int count, SessionSetup* setup) {
     std::vector<std::uint8_t> jpeg;
     cv::imencode(".jpg", frames[0].image, jpeg, {cv::IMWRITE_JPEG_QUALITY, 90});
     out.push_back({std::string(jpeg.begin(), jpeg.end()), frames[0].captured_at});
-    session.take(perception.watch(frames), static_cast<std::size_t>(i) + 1);
-    const auto& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
+    session.update_percepts(perception.watch(frames), static_cast<std::size_t>(i) + 1);
+    const auto& painted = session.compose_and_record(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
   }
@@ -159,18 +159,18 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
     frame.camera = setup.rig.cameras[0].name;
     frame.captured_at = captured_at;
     frames.put({std::move(frame)});
-    const auto taken = frames.take({});
+    const auto taken = frames.take_newest({});
     const double was_taken = processor_ms();
-    const Percepts& watched = perception.watch(*taken);
+    const Percepts& percepts = perception.watch(*taken);
     const double was_watched = processor_ms();
-    seen.put(watched);
+    seen.put(percepts);
     const auto known = seen.take({});
     const auto tracks = tracker::predicted(known->motions, shifted(captured_at, k_lag_s));
     const double was_handed = processor_ms();
-    markers += watched.detections[0].size();
+    markers += percepts.detections[0].size();
     decode.push_back(was_decoded - begun);
     watch.push_back(was_watched - was_taken);
-    filter.push_back(watched.filter_ms);
+    filter.push_back(percepts.filter_ms);
     hand.push_back(was_taken - was_decoded + was_handed - was_watched);
     LIMN_CHECK(!tracks.empty());
     const cv::Mat grey = to_grey(taken->front().image);
@@ -220,10 +220,10 @@ FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const
   for (const Shot& shot : shots) {
     const double begun = wall_ms();
     const std::vector<Frame> frames = {decoded(shot, setup)};
-    if (recorder) recorder->watched(frames);
-    session.take(perception.watch(frames), ++moments);
-    session.paint(shifted(shot.captured_at, 0.02), shifted(shot.captured_at, k_lag_s));
-    session.look_for_drift(shifted(shot.captured_at, 0.02));
+    if (recorder) recorder->record_frames(frames);
+    session.update_percepts(perception.watch(frames), ++moments);
+    session.compose_and_record(shifted(shot.captured_at, 0.02), shifted(shot.captured_at, k_lag_s));
+    session.check_drift(shifted(shot.captured_at, 0.02));
     times.push_back(wall_ms() - begun);
   }
   if (recorder) {
@@ -246,10 +246,10 @@ void print_edits(const std::vector<Shot>& shots, const SessionSetup& setup) {
     const bool is_edited = i % 3 == 2;
     if (is_edited) LIMN_CHECK(session.edit({"next_variant", "mirror", ""}, "bench", shots[i].captured_at));
     const std::vector<Frame> frames = {decoded(shots[i], setup)};
-    session.take(perception.watch(frames), i + 1);
-    session.paint(shifted(shots[i].captured_at, 0.02), shifted(shots[i].captured_at, k_lag_s));
+    session.update_percepts(perception.watch(frames), i + 1);
+    session.compose_and_record(shifted(shots[i].captured_at, 0.02), shifted(shots[i].captured_at, k_lag_s));
     const double painted_ms = wall_ms() - begun;
-    session.look_for_drift(shifted(shots[i].captured_at, 0.02));
+    session.check_drift(shifted(shots[i].captured_at, 0.02));
     constexpr int k_moments = 20;
     if (is_edited)
       for (int k = 0; k < k_moments; ++k) waits.push_back((k + 0.5) / k_moments * before_ms + painted_ms);

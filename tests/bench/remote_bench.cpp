@@ -70,13 +70,14 @@ class Stage {
     constexpr int k_cameras[] = {0};
     const std::vector<Frame> frames = rig_->expose(k_cameras);
     const auto begun = Clock::now();
-    if (!frames.empty()) session_->take(perception_->watch(frames), ++moments_);
+    if (!frames.empty()) session_->update_percepts(perception_->watch(frames), ++moments_);
     server->apply_edits(&*session_, rig_->now());
     server->publish_state(*session_, *telemetry_, health_, rig_->now());
-    session_->paint(rig_->now(), shifted(rig_->now(), k_lag_s));
+    session_->compose_and_record(rig_->now(), shifted(rig_->now(), k_lag_s));
     const double took_ms = ms_since(begun);
     for (std::size_t i = 0; i < setup_.rig.projectors.size(); ++i)
-      static_cast<void>(rig_->projector(static_cast<int>(i)).show(session_->painted().projectors[i]).value());
+      static_cast<void>(
+          rig_->projector(static_cast<int>(i)).show(session_->composed().projectors[i]).value());
     return took_ms;
   }
 

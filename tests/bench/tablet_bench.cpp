@@ -77,8 +77,8 @@ struct Room {
   }
 
   void step() {
-    session.take(see(), moments);
-    const apps::ComposedFrame& painted = session.paint(rig.now(), shifted(rig.now(), 0.04));
+    session.update_percepts(see(), moments);
+    const apps::ComposedFrame& painted = session.compose_and_record(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
   }
@@ -144,7 +144,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, remote::Tabl
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
       const TabletShot& shot = shots[i];
-      room->session.take(moments[i], room->moments);
+      room->session.update_percepts(moments[i], room->moments);
       tablet_view->update_session(room->session);
       const double begun_processor = processor_ms(), begun = now_ms();
       const cv::Mat image = device::decode_jpeg(shot.jpeg).value();
@@ -212,7 +212,7 @@ void print_projector_loop(const std::vector<TabletShot>& shots, Room* room, remo
       const char* way = i % 2 == 0 ? "0.2 0 0" : "-0.2 0 0";
       LIMN_CHECK(room->session.edit({"nudge", "mirror", way}, "bench", room->rig.now()).ok());
       const double begun = now_ms();
-      room->session.paint(room->rig.now(), shifted(room->rig.now(), 0.04));
+      room->session.compose_and_record(room->rig.now(), shifted(room->rig.now(), 0.04));
       const double painted = now_ms();
       tablet_view->update_session(room->session);
       know.push_back(now_ms() - painted);
@@ -249,7 +249,7 @@ int main(int argc, char** argv) {
   const sim::World world =
       sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
   Room room(world);
-  VirtualTablet tablet(world, room.session.painted().projectors, k_width, k_height, seed);
+  VirtualTablet tablet(world, room.session.composed().projectors, k_width, k_height, seed);
   std::vector<TabletShot> shots;
   for (unsigned long i = 0; i < std::max(1UL, frames); ++i)
     shots.push_back(tablet.shoot(10.0 * static_cast<double>(i) / static_cast<double>(frames)));

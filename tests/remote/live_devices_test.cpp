@@ -164,7 +164,7 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
   sent.camera = "camera0";
   const Frame taken{"camera0", colours, {}};
   auto recorder = apps::Recorder::create(folder / "recording", setup).value();
-  recorder->watched(std::vector{sent, taken});
+  recorder->record_frames(std::vector{sent, taken});
   ASSERT_TRUE(recorder->finish().ok());
   const auto first = apps::load_frame(folder / "recording/frames/camera0/000000.jpg");
   ASSERT_TRUE(first) << first.message();
@@ -350,10 +350,10 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   EXPECT_EQ(session->recalibration_progress(), "");
   EXPECT_TRUE(
       test::pose_near(session->setup().rig.cameras[0].imager_from_world, truth, 0.02 * M_PI / 180, 0.0015));
-  ASSERT_TRUE(session->painted().posed.world_from_prototype);
-  EXPECT_TRUE(
-      test::pose_near(*session->painted().posed.world_from_prototype, world_from_prototype, 0.2_deg, 1.5_mm));
-  EXPECT_GT(cv::countNonZero(session->painted().projectors[1].reshape(1)), 1000);
+  ASSERT_TRUE(session->composed().posed.world_from_prototype);
+  EXPECT_TRUE(test::pose_near(*session->composed().posed.world_from_prototype, world_from_prototype, 0.2_deg,
+                              1.5_mm));
+  EXPECT_GT(cv::countNonZero(session->composed().projectors[1].reshape(1)), 1000);
   apps::ReplayOptions replay;
   replay.session = folder / "recording";
   const Status replayed = apps::run_replay(replay);

@@ -61,11 +61,11 @@ TEST(CodeSign, IsReadOnThePrototype) {
   const int camera = 0;
   std::vector<cv::Mat> light;
   for (std::size_t i = 1; i <= 2; ++i) {
-    session.take(perception.watch(rig.expose(std::span(&camera, 1))), i);
-    light = session.paint(rig.now(), shifted(rig.now(), 0.03)).projectors;
+    session.update_percepts(perception.watch(rig.expose(std::span(&camera, 1))), i);
+    light = session.compose_and_record(rig.now(), shifted(rig.now(), 0.03)).projectors;
   }
-  ASSERT_TRUE(session.painted().posed.world_from_prototype.has_value());
-  const Pose world_from_prototype = *session.painted().posed.world_from_prototype;
+  ASSERT_TRUE(session.composed().posed.world_from_prototype.has_value());
+  const Pose world_from_prototype = *session.composed().posed.world_from_prototype;
   const cv::Mat sign = 0.75 * pairing_code_image(k_text, "123456", "work", 12);
   const cv::Mat points = session.free_surface(0);
   const Eigen::Vector3d d_up = world_from_prototype.rotation.inverse() * Eigen::Vector3d::UnitZ();

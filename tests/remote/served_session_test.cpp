@@ -57,7 +57,7 @@ class AServedSession : public AServer {
 
   // What a projector shows, as the frame loop hands it over.
   cv::Mat lit_by(std::size_t projector) {
-    return apps::with_overlays(session_->painted(), session_->setup().rig,
+    return apps::with_overlays(session_->composed(), session_->setup().rig,
                                server_->overlays(&*session_))[projector];
   }
 
@@ -166,7 +166,7 @@ TEST_F(AServedSession, TellsMaterialsAndLight) {
     for (const char* light : {"-135 -20.5 0.65 0.35 0.15", "30 45 0.6 0.3 0.1", "170 5 2 0 0"})
       EXPECT_EQ(done("light", "", light), RendererInput("", light));
   });
-  session_->paint(at_, at_);  // which looks are saved of
+  session_->compose_and_record(at_, at_);  // which looks are saved of
   ASSERT_TRUE(session_->edit({"save_look", "", "dark"}, "test", at_));
   play_while([&] {
     EXPECT_EQ(done("light", "", ""), RendererInput("", ""));
@@ -290,7 +290,7 @@ TEST_F(AServedSession, KeepsCommentsWithTheProject) {
 
 TEST_F(AServedSession, GivesImagesAndAssemblies) {
   ASSERT_TRUE(session_->edit({"save_look", "", "calm one"}, "test", at_));
-  session_->paint(at_, at_);
+  session_->compose_and_record(at_, at_);
   const std::string slot = session_->setup().scene.slots[0].name,
                     variant = session_->setup().scene.slots[0].variants[0].name;
   play_while([&] {
@@ -302,7 +302,7 @@ TEST_F(AServedSession, GivesImagesAndAssemblies) {
     const auto image = device::decode_jpeg(
         {reinterpret_cast<const std::uint8_t*>(projector.body.data()), projector.body.size()});
     ASSERT_TRUE(image) << image.message();
-    EXPECT_EQ(image->size(), session_->painted().projectors[0].size());
+    EXPECT_EQ(image->size(), session_->composed().projectors[0].size());
     const auto part = client()->get("/picture/variant/" + slot + "/" + variant + ".png", token);
     EXPECT_EQ(part.status, 200) << part.body;
     EXPECT_EQ(part.body.substr(1, 3), "PNG");
@@ -321,8 +321,8 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
   ServeOptions options;
   options.code_duration = 1500ms;
   open(options, echoing_providers());
-  session_->paint(at_, at_);
-  const cv::Mat painted = session_->painted().projectors[0].clone();
+  session_->compose_and_record(at_, at_);
+  const cv::Mat painted = session_->composed().projectors[0].clone();
   const auto is_painted = [&](const cv::Mat& lit) { return cv::norm(lit, painted, cv::NORM_INF) == 0; };
   EXPECT_TRUE(is_painted(lit_by(0)));
   server_->show_code("projector0", Role::work);
@@ -344,8 +344,8 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
       {}, 1.0 / 6, 1.0 / 6, cv::INTER_AREA);
   const cv::Rect middle({(lit.cols - sign.cols) / 2, (lit.rows - sign.rows) / 2}, sign.size());
   EXPECT_LE(cv::norm(lit(middle), sign, cv::NORM_INF), 1);
-  EXPECT_TRUE(is_painted(session_->painted().projectors[0])) << "what is recorded and told";
-  EXPECT_EQ(cv::norm(lit_by(1), session_->painted().projectors[1], cv::NORM_INF), 0);
+  EXPECT_TRUE(is_painted(session_->composed().projectors[0])) << "what is recorded and told";
+  EXPECT_EQ(cv::norm(lit_by(1), session_->composed().projectors[1], cv::NORM_INF), 0);
   play_while([&] {
     const std::string looks = token_of(Role::look, "Ben"), works = token_of(Role::work, "Ann");
     std::this_thread::sleep_for(100ms);
@@ -536,14 +536,14 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
     while (seconds_since(begun) < seconds) {
       const auto frame = Clock::now();
       const int camera = 0;
-      session_->take(perception.watch(rig.expose(std::span(&camera, 1))), ++count);
+      session_->update_percepts(perception.watch(rig.expose(std::span(&camera, 1))), ++count);
       at_ = rig.now();
       EXPECT_TRUE(session_->edit({"nudge", "mirror", count % 2 ? "0.2 0 0" : "-0.2 0 0"}, "test", at_));
       double guests_ms = -thread_ms();
       server_->apply_edits(&*session_, at_);
       server_->publish_state(*session_, *telemetry_, health_, at_);
       guests_ms += thread_ms();
-      const apps::ComposedFrame& painted = session_->paint(at_, shifted(at_, 0.04));
+      const apps::ComposedFrame& painted = session_->compose_and_record(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);
       for (std::size_t i = 0; i < painted.projectors.size(); ++i)
         EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(lit_by(i)));

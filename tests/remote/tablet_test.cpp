@@ -63,8 +63,9 @@ class Room {
   // One more of the room's frames.
   void step() {
     const int camera = 0;
-    session_->take(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
-    const apps::ComposedFrame& painted = session_->paint(rig_->now(), shifted(rig_->now(), 0.04));
+    session_->update_percepts(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
+    const apps::ComposedFrame& painted =
+        session_->compose_and_record(rig_->now(), shifted(rig_->now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig_->projector(static_cast<int>(k)).show(painted.projectors[k]).value();
     tablet_view_->update_session(*session_);
@@ -89,7 +90,7 @@ class Room {
   }
 
   test::VirtualTablet tablet(std::uint64_t seed, int width = k_width, int height = k_height) {
-    return {rig_->world(), session_->painted().projectors, width, height, seed};
+    return {rig_->world(), session_->composed().projectors, width, height, seed};
   }
 
   TabletView& tablet_view() { return *tablet_view_; }
@@ -264,13 +265,13 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
 
   // Nobody has asked for it.
   for (int i = 0; i < 3; ++i) {
-    session.see("Ann", seen.p_viewpoint_world, room.rig().now());
+    session.note_tablet("Ann", seen.p_viewpoint_world, room.rig().now());
     room.step();
   }
-  EXPECT_FALSE(session.painted().p_guest_eye_world.has_value());
+  EXPECT_FALSE(session.composed().p_guest_eye_world.has_value());
   EXPECT_EQ(session.windows(), std::set<std::string>{"Ann"});
   const LitMirror before =
-      lit_mirror(world, session.painted().projectors, aside, folder / "lit-for-its-own-viewer");
+      lit_mirror(world, session.composed().projectors, aside, folder / "lit-for-its-own-viewer");
 
   // Followed: what else is seen of other guests does not matter.
   ASSERT_TRUE(session.edit({"viewer", "", "Ann"}, "Ben", room.rig().now()).ok());
@@ -278,19 +279,19 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   double farthest_m = 0;
   const auto steps = [&](int count, bool is_seen) {
     for (int i = 0; i < count; ++i) {
-      if (is_seen) session.see("Ann", seen.p_viewpoint_world, room.rig().now());
-      session.see("Ben", p_middle + Eigen::Vector3d(1, -1, 0), room.rig().now());
+      if (is_seen) session.note_tablet("Ann", seen.p_viewpoint_world, room.rig().now());
+      session.note_tablet("Ben", p_middle + Eigen::Vector3d(1, -1, 0), room.rig().now());
       room.step();
-      const Eigen::Vector3d p_now = session.painted().p_guest_eye_world.value_or(p_own);
+      const Eigen::Vector3d p_now = session.composed().p_guest_eye_world.value_or(p_own);
       farthest_m = std::max(farthest_m, (p_now - p_before).norm());
       p_before = p_now;
     }
   };
   steps(11, true);
-  EXPECT_EQ(session.painted().follows, "Ann");
+  EXPECT_EQ(session.composed().follows, "Ann");
   EXPECT_LT((p_before - *seen.p_viewpoint_world).norm(), 1e-6);
   const LitMirror followed =
-      lit_mirror(world, session.painted().projectors, aside, folder / "lit-for-the-tablet");
+      lit_mirror(world, session.composed().projectors, aside, folder / "lit-for-the-tablet");
   std::printf("light of the mirror: %.1f mm off, overlap %.2f; followed %.1f mm, %.2f; eye %.1f mm off; %s\n",
               before.off_mm, before.overlap, followed.off_mm, followed.overlap,
               1e3 * (*seen.p_viewpoint_world - p_tablet).norm(), folder.c_str());
@@ -301,19 +302,19 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
 
   // The tablet is silent: after a second the eye goes back, never at once.
   steps(8, false);
-  EXPECT_EQ(session.painted().follows, "Ann");
+  EXPECT_EQ(session.composed().follows, "Ann");
   steps(2, false);
-  EXPECT_EQ(session.painted().follows, "");
-  EXPECT_TRUE(session.painted().p_guest_eye_world.has_value());
+  EXPECT_EQ(session.composed().follows, "");
+  EXPECT_TRUE(session.composed().p_guest_eye_world.has_value());
   steps(9, false);
-  EXPECT_FALSE(session.painted().p_guest_eye_world.has_value());
+  EXPECT_FALSE(session.composed().p_guest_eye_world.has_value());
   EXPECT_LT(farthest_m, 1.05 * (p_own - p_tablet).norm() / 0.8 * k_period_s) << "of 0.8 s for the whole way";
   // It comes again and its window is closed.
   steps(3, true);
-  EXPECT_EQ(session.painted().follows, "Ann");
-  session.see("Ann", std::nullopt, room.rig().now());
+  EXPECT_EQ(session.composed().follows, "Ann");
+  session.note_tablet("Ann", std::nullopt, room.rig().now());
   steps(1, false);
-  EXPECT_EQ(session.painted().follows, "");
+  EXPECT_EQ(session.composed().follows, "");
   EXPECT_EQ(session.windows(), std::set<std::string>{"Ben"});
 }
 
@@ -381,7 +382,7 @@ TEST(Tablet, AMendedRigIsDrawnWith) {
   const cv::Mat before = image(&room.tablet_view());
   Rig mended = room.session().setup().rig;
   mended.cameras[0].imager_from_world.translation.x() += 0.05;
-  ASSERT_TRUE(room.session().mend(mended, room.rig().now()));
+  ASSERT_TRUE(room.session().replace_rig(mended, room.rig().now()));
   const cv::Mat after = image(&room.tablet_view());
   EXPECT_GT(cv::countNonZero(drawn_mask(before, after)), 50);
   const auto fresh = TabletView::create(room.session().setup(), folder / "lenses").value();

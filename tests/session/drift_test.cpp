@@ -55,15 +55,15 @@ std::vector<RendererInput> found(const json& events, double seconds) {
   while (rig.next_exposure() < shifted(Stamp{}, seconds)) {
     room.set(seconds_between(Stamp{}, rig.next_exposure()));
     const int camera = 0;
-    const Percepts& watched = perception.watch(rig.expose(std::span(&camera, 1)));
+    const Percepts& percepts = perception.watch(rig.expose(std::span(&camera, 1)));
     const ComposedFrame& painted = composer.compose(
-        frame_input(setup.scene, {}, watched, show_state, {rig.now(), shifted(rig.now(), 0.033)}));
+        frame_input(setup.scene, {}, percepts, show_state, {rig.now(), shifted(rig.now(), 0.033)}));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
-    composer.look_for_drift(watched);
+    composer.check_drift(percepts);
     if (composer.drift().has_value() == before.has_value()) continue;
     before = composer.drift();
-    out.push_back({seconds_between(Stamp{}, watched.captured_at), before.value_or(Drift{})});
+    out.push_back({seconds_between(Stamp{}, percepts.captured_at), before.value_or(Drift{})});
     std::printf("%.1f s: %s\n", out.back().at_s, before ? sentence(*before).c_str() : "nothing");
   }
   return out;

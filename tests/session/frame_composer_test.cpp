@@ -42,14 +42,14 @@ TEST(FrameComposer, APrototypeThatStandsStillIsShownWhereItWas) {
   };
   const auto place = [&]() -> Place {
     const int camera = 0;
-    const Percepts& watched = perception.watch(rig.expose(std::span(&camera, 1)));
+    const Percepts& percepts = perception.watch(rig.expose(std::span(&camera, 1)));
     const Stamp shown_at = shifted(rig.now(), 0.033);
     const ComposedFrame& painted =
-        composer.compose(frame_input(scene, {}, watched, show_state, {rig.now(), shown_at}));
+        composer.compose(frame_input(scene, {}, percepts, show_state, {rig.now(), shown_at}));
     for (std::size_t i = 0; i < painted.projectors.size(); ++i)
       EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(painted.projectors[i]));
     Place place{painted.posed.world_from_prototype.value_or(Pose{}), {}};
-    for (const Track& track : tracker::predicted(watched.motions, shown_at))
+    for (const Track& track : tracker::predicted(percepts.motions, shown_at))
       if (track.body == "prototype") place.estimated = track.world_from_body;
     return place;
   };

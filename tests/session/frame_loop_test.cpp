@@ -33,13 +33,13 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
     said += "perceive ";
     const int camera = 0;
     Perceived out;
-    out.watched = perception_->watch(rig_->expose(std::span(&camera, 1)));
+    out.percepts = perception_->watch(rig_->expose(std::span(&camera, 1)));
     out.moments = ++moments_;
     return out;
   }
   Status edit(Session* session) override {
     said += "edit ";
-    EXPECT_EQ(session->watched().captured_at, perception_->watched().captured_at)
+    EXPECT_EQ(session->percepts().captured_at, perception_->percepts().captured_at)
         << "perceive() comes before edit()";
     return session->edit({"grid", "", "toggle"}, "test", now());
   }
@@ -53,8 +53,8 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
   void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
     said += images.empty() ? "no-screens " : "screens ";
   }
-  void hear(const SessionMoment&) override { said += "hear "; }
-  void tell(const SessionMoment& moment) override {
+  void apply_edits(const SessionMoment&) override { said += "hear "; }
+  void publish_state(const SessionMoment& moment) override {
     said += moment.shown ? "tell-shown " : "tell ";
     if (moment.shown) {
       EXPECT_EQ(moment.shown->shown_at, shifted(now(), 0.04));
@@ -122,7 +122,7 @@ TEST_F(AFrameLoop, TakesInWhatChangesWhenNoImageIsDue) {
   notes_->shows = false;
   ASSERT_TRUE(played(2));
   EXPECT_EQ(notes_->said, "perceive edit hear perceive edit hear ");
-  EXPECT_EQ(session_->painted().painted_at, Stamp{});
+  EXPECT_EQ(session_->composed().painted_at, Stamp{});
 }
 
 TEST_F(AFrameLoop, EndsWhenAClientDoes) {

@@ -231,25 +231,25 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
                              return {};
                            }});
   const int camera = 0;
-  session->take(perception->watch(rig.expose(std::span(&camera, 1))), 1);
+  session->update_percepts(perception->watch(rig.expose(std::span(&camera, 1))), 1);
   const Stamp now = rig.now(), shown_at = shifted(now, 0.03);
-  const cv::Mat good = session->paint(now, shown_at).projectors[0].clone();
+  const cv::Mat good = session->compose_and_record(now, shown_at).projectors[0].clone();
   ASSERT_GT(cv::countNonZero(good.reshape(1)), 100);
   const auto is_good = [&](const ComposedFrame& painted) {
     return cv::norm(painted.projectors[0], good, cv::NORM_INF) == 0;
   };
   is_lost = true;
   for (const double later_s : {0.03, 0.06, 0.5, 1.2})
-    EXPECT_TRUE(is_good(session->paint(shifted(now, later_s), shifted(shown_at, later_s))));
+    EXPECT_TRUE(is_good(session->compose_and_record(shifted(now, later_s), shifted(shown_at, later_s))));
   EXPECT_TRUE(session->screen().empty());
   can_renew = true;
   rig.advance(3);
-  session->take(perception->watch(rig.expose(std::span(&camera, 1))), 2);
-  const cv::Mat anew = session->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0].clone();
+  session->update_percepts(perception->watch(rig.expose(std::span(&camera, 1))), 2);
+  const cv::Mat anew = session->compose_and_record(rig.now(), shifted(rig.now(), 0.03)).projectors[0].clone();
   Telemetry unused = Telemetry::create({}).value();
   auto fresh = Session::create(setup, &unused, nullptr, false);  // this one has never lost its context
   ASSERT_TRUE(fresh);
-  fresh->take(perception->watched(), 1);
+  fresh->take(perception->percepts(), 1);
   const cv::Mat expected = fresh->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0];
   EXPECT_EQ(cv::norm(anew, expected, cv::NORM_INF), 0);
   EXPECT_FALSE(is_lost);
@@ -551,10 +551,10 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   const auto found = [&] {
     auto perception = Perception::create(*world.scene, world.rig);
     EXPECT_TRUE(perception) << perception.message();
-    const Percepts& watched = perception->watch(frames);
-    EXPECT_GT(watched.detections[0].size(), 3u);
-    EXPECT_GT(watched.detections[1].size(), 3u);
-    return swapped_cameras(world.rig, bodies, watched.detections, watched.captured_at);
+    const Percepts& percepts = perception->watch(frames);
+    EXPECT_GT(percepts.detections[0].size(), 3u);
+    EXPECT_GT(percepts.detections[1].size(), 3u);
+    return swapped_cameras(world.rig, bodies, percepts.detections, percepts.captured_at);
   };
   EXPECT_FALSE(found());
   std::swap(frames[0].image, frames[1].image);
@@ -570,7 +570,7 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
   ASSERT_TRUE(context && session && perception);
   for (const int moment : {1, 2}) {  // it is reported once only
     for (Frame& frame : frames) frame.captured_at = shifted(frame.captured_at, 5);
-    session->take(perception->watch(frames), static_cast<std::size_t>(moment));
+    session->update_percepts(perception->watch(frames), static_cast<std::size_t>(moment));
   }
   const json notes = telemetry.summary().at("notes");
   ASSERT_EQ(notes.size(), 1u) << notes.dump();
@@ -619,9 +619,9 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
     while (seconds_between(Stamp{}, rig.next_exposure()) < end_s) {
       room->set(seconds_between(Stamp{}, rig.next_exposure()));
       const int camera = 0;
-      session->take(perception->watch(rig.expose(std::span(&camera, 1))), ++moments);
-      for (const auto& [guest, p_eye] : guests) session->see(guest, p_eye, rig.now());
-      const ComposedFrame& painted = session->paint(rig.now(), shifted(rig.now(), 0.04));
+      session->update_percepts(perception->watch(rig.expose(std::span(&camera, 1))), ++moments);
+      for (const auto& [guest, p_eye] : guests) session->note_tablet(guest, p_eye, rig.now());
+      const ComposedFrame& painted = session->compose_and_record(rig.now(), shifted(rig.now(), 0.04));
       const Eigen::Vector3d p_eye = painted.viewer.imager_from_world.inverse().translation;
       if (p_before) farthest_m = std::max(farthest_m, (p_eye - *p_before).norm());
       p_before = p_eye;
@@ -665,8 +665,8 @@ TEST(Live, MakesARoomForARigAndAScene) {
   auto perception = Perception::create(*room->scene, room->rig);
   ASSERT_TRUE(perception);
   const int camera = 0;
-  const Percepts& watched = perception->watch(rig.expose(std::span(&camera, 1)));
-  EXPECT_EQ(watched.motions.size(), 3u);  // the door and both slots
+  const Percepts& percepts = perception->watch(rig.expose(std::span(&camera, 1)));
+  EXPECT_EQ(percepts.motions.size(), 3u);  // the door and both slots
 }
 
 TEST(Live, SaysWhatIsWrong) {

@@ -362,10 +362,10 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   auto perception = Perception::create(session_->setup().scene, rig);
   ASSERT_TRUE(perception);
   const int camera = 0;
-  session_->take(perception->watch(virtual_rig.expose(std::span(&camera, 1))), 1);
-  session_->paint(virtual_rig.now(), virtual_rig.now());
+  session_->update_percepts(perception->watch(virtual_rig.expose(std::span(&camera, 1))), 1);
+  session_->compose_and_record(virtual_rig.now(), virtual_rig.now());
   const auto poses = heard();
-  const scene::PosedScene& posed = session_->painted().posed;
+  const scene::PosedScene& posed = session_->composed().posed;
   ASSERT_TRUE(posed.world_from_prototype.has_value());
   ASSERT_FALSE(posed.parts.empty());
   const Pose part = posed.world_from_prototype->inverse() * posed.parts[0].world_from_part;

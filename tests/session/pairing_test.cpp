@@ -78,8 +78,8 @@ TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
     now += 1 / 30.0;
     const cv::Mat image = test::image_of(rig.cameras[0].lens, ground, std::span(&marker, 1), {}, rng);
     const Frame frame{"camera0", image, shifted(Stamp{}, now)};
-    const Percepts& watched = perception.watch(std::span(&frame, 1));
-    return watched.loose.empty() ? now : seconds_between(Stamp{}, watched.loose[0].still_since);
+    const Percepts& percepts = perception.watch(std::span(&frame, 1));
+    return percepts.loose.empty() ? now : seconds_between(Stamp{}, percepts.loose[0].still_since);
   };
   double since = 0;
   while (now < 2) since = see({0, 0, 0});
@@ -170,12 +170,12 @@ class ASession : public testing::Test {
   void watch(int moments) {
     for (int i = 0; i < moments; ++i) {
       const int camera = 0;
-      session_->take(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
+      session_->update_percepts(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
     }
   }
 
   cv::Mat painted(std::size_t projector = 0) {
-    return session_->paint(rig_->now(), rig_->now()).projectors[projector].clone();
+    return session_->compose_and_record(rig_->now(), rig_->now()).projectors[projector].clone();
   }
 
   void edit(const std::string& action, const std::string& slot, const std::string& value) {
@@ -230,11 +230,11 @@ class ASession : public testing::Test {
 
 TEST_F(ASession, AMarkerGlowsOnceItLiesStillForASecond) {
   watch(30);
-  EXPECT_TRUE(waiting_markers(setup_.scene, session_->show_state(), session_->watched()).empty());
+  EXPECT_TRUE(waiting_markers(setup_.scene, session_->show_state(), session_->percepts()).empty());
   const cv::Mat before[2] = {painted(0), painted(1)};
   EXPECT_FALSE(session_->edit({"pair", "mirror", ""}, "test", rig_->now()).ok());
   watch(8);
-  const auto waiting = waiting_markers(setup_.scene, session_->show_state(), session_->watched());
+  const auto waiting = waiting_markers(setup_.scene, session_->show_state(), session_->percepts());
   ASSERT_EQ(waiting.size(), 1u);
   EXPECT_EQ(waiting[0].marker, k_nine);
   const Eigen::Vector3d p_true = world_.world_from_prototype * k_laid;
@@ -262,7 +262,7 @@ TEST_F(ASession, AMarkerGlowsOnceItLiesStillForASecond) {
   }
   EXPECT_EQ(lit, 1);
   edit("pair", "mirror", "");
-  EXPECT_TRUE(waiting_markers(setup_.scene, session_->show_state(), session_->watched()).empty());
+  EXPECT_TRUE(waiting_markers(setup_.scene, session_->show_state(), session_->percepts()).empty());
 }
 
 TEST_F(ASession, AGridOfMillimetresLiesOnThePrototype) {
@@ -419,7 +419,7 @@ TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
     return box.sizes().maxCoeff();
   };
   const float guessed = long_side(*scene);
-  ASSERT_TRUE(session_->show(*scene, rig_->now()).ok());
+  ASSERT_TRUE(session_->replace_scene(*scene, rig_->now()).ok());
   const fs::path page = folder_ / "page.html";
   ASSERT_TRUE(telemetry_->write_page(page, "x").ok());
   EXPECT_NE(read_file(page).value().find("new part of slot 'mirror' is assumed to be in m, 149 mm long."),

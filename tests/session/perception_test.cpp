@@ -51,11 +51,11 @@ TEST(Perception, PredictionMakesUpForTheLag) {
     const double captured_s = seconds_between(Stamp{}, rig.next_exposure());
     room->set(captured_s);
     const int camera = 0;
-    const Percepts& watched = perception->watch(rig.expose(std::span(&camera, 1)));
+    const Percepts& percepts = perception->watch(rig.expose(std::span(&camera, 1)));
     const double shown_s = captured_s + k_lag_s;
     const Eigen::Vector3d p_true = room->world_from_marker(marker, shown_s).translation;
     const auto off = [&](tracker::Prediction how) {
-      for (const Track& track : tracker::predicted(watched.motions, shifted(Stamp{}, shown_s), how))
+      for (const Track& track : tracker::predicted(percepts.motions, shifted(Stamp{}, shown_s), how))
         if (track.body == "mirror") return (track.world_from_body.translation - p_true).norm();
       return 1.0;
     };
@@ -124,7 +124,7 @@ TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
   ASSERT_TRUE(perception) << perception.message();
   const std::size_t all = perception->watch(std::span(&still, 1)).detections[0].size();
   ASSERT_GE(all, 5u);
-  const auto& c = perception->watched().detections[0][0].corners_px;
+  const auto& c = perception->percepts().detections[0][0].corners_px;
   const double side = (c[1] - c[0]).norm();
   double moved = 0;
   int image = 0;

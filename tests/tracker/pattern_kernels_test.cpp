@@ -66,7 +66,7 @@ Light light_of(const State& state, int version) {
   for (std::size_t i = 0; i < k_unknowns; ++i) results.derivatives[i] = seen.derivatives[i].data();
   const Guess guess = guess_of(some_cells(), state, true, k_origin);
   const PatternKernels& functions = pattern_kernels(version);
-  functions.see(guess, {x.data(), y.data(), level_x.data(), level_y.data()}, k_count, results);
+  functions.evaluate(guess, {x.data(), y.data(), level_x.data(), level_y.data()}, k_count, results);
   functions.find_edges(guess, x.data(), y.data(), k_count, seen.edges.data());
   return seen;
 }

@@ -34,9 +34,9 @@ TEST(StillBoard, IsStillWhenItRestsInANewPlace) {
   double at_s = 0;
   const auto take = [&](double x, double tremble) {
     at_s += 1 / 30.0;
-    return board.take(corners_at(x, tremble), shifted(Stamp{}, at_s));
+    return board.add_corners(corners_at(x, tremble), shifted(Stamp{}, at_s));
   };
-  EXPECT_EQ(board.take({}, Stamp{}), State::unseen);
+  EXPECT_EQ(board.add_corners({}, Stamp{}), State::unseen);
   for (int i = 0; i < 60; ++i) EXPECT_EQ(take(2.0 * i, 0), State::moving) << i;
   int waited = 0;
   while (take(120, waited % 2 ? 0.1 : -0.1) == State::moving) ASSERT_LT(++waited, 60);
@@ -63,7 +63,7 @@ TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
     cv::add(image, noise, image);
     if (hand_x >= 0) image(cv::Rect(hand_x, 60, 40, 40)) = cv::Scalar(180);
     at_s += 0.1;
-    return room.take(image, shifted(Stamp{}, at_s));
+    return room.add_image(image, shifted(Stamp{}, at_s));
   };
   for (int i = 0; i < 200; ++i) ASSERT_FALSE(rests_after(i)) << "a hand moves through the image";
   int waited = 0;
@@ -75,7 +75,7 @@ TEST(StillRoom, RestsWhenNothingMovesForAWhile) {
 TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   const std::filesystem::path folder = test::test_folder();
   test::BoardRoom room(load_plan(test::small_plan(folder)).value());
-  DeviceBackend stage(room.devices(), room.plan.board, nullptr);
+  DeviceBackend device_backend(room.devices(), room.plan.board, nullptr);
   ImageWriter writer;
   const WizardOptions options{.out = folder / "rig"};
   const calib::CaptureSet captures = planned(room.plan, room.rig, options.out / "captures").value();
@@ -84,7 +84,7 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   std::string lines;
   std::optional<Rig> last;  // solved from the poses so far
   const auto done = calibrated(
-      options, "{\"schema\": \"limn.captured_plan/1\"}", captures, places, stage.surroundings(&writer),
+      options, "{\"schema\": \"limn.captured_plan/1\"}", captures, places, device_backend.backend(&writer),
       {.say = [&](const std::string& line) { lines += line + "\n"; },
        .aims = [&](int pose) { room.go(room.plan.world_from_board[static_cast<std::size_t>(pose)]); },
        .judged =
@@ -106,7 +106,7 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
       calib::plan_captures(folder / "again", captures.cameras, captures.projectors, captures.board,
                            calib::PatternCode::gray, {.inverses = false});
   const Stamp before = room.rig.now();
-  const Status taken = captured_once(again, rig, stage.surroundings(&writer));
+  const Status taken = captured_once(again, rig, device_backend.backend(&writer));
   ASSERT_TRUE(taken) << taken.message();
   EXPECT_LT(seconds_between(before, room.rig.now()), 15);
   const auto checked = rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});

@@ -31,7 +31,7 @@ struct Bench {
   }
 
   ExposureReading seen() {
-    const auto all = measured_exposure(captures, stage_of(rig.get(), nullptr, nullptr));
+    const auto all = measured_exposure(captures, capture_backend(rig.get(), nullptr, nullptr));
     EXPECT_TRUE(all.ok()) << (all ? "" : all.message());
     return all->at(0);
   }
@@ -87,7 +87,7 @@ TEST(LightCheck, NamesAProjectorThatNoCameraSees) {
 }
 
 // The rig's projector and camera for a latency measurement.
-FlashStage flashes(sim::VirtualRig* rig) {
+FlashDevices flashes(sim::VirtualRig* rig) {
   rig->darken();
   const auto show = [rig](bool white) -> Result<Stamp> {
     const Stamp at = rig->now();

@@ -27,15 +27,15 @@ std::string difference(const nlohmann::json& then, const nlohmann::json& now) {
   std::set<std::string> keys;
   for (const auto* leaves : {&leaves_then, &leaves_now})
     for (const auto& leaf : leaves->items()) keys.insert(leaf.key());
-  const auto told = [](const nlohmann::json& leaves, const std::string& key) {
+  const auto field_text = [](const nlohmann::json& leaves, const std::string& key) {
     return leaves.contains(key) ? leaves[key].dump() : std::string("nothing");
   };
   for (const std::string& key : keys) {
-    if (told(leaves_then, key) == told(leaves_now, key)) continue;
+    if (field_text(leaves_then, key) == field_text(leaves_now, key)) continue;
     std::string name = key.substr(1);
     std::replace(name.begin(), name.end(), '/', '.');
-    return fmt::format("{}: captured with {}, this plan says {}", name, told(leaves_then, key),
-                       told(leaves_now, key));
+    return fmt::format("{}: captured with {}, this plan says {}", name, field_text(leaves_then, key),
+                       field_text(leaves_now, key));
   }
   return "";
 }

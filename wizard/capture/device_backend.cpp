@@ -31,29 +31,31 @@ DeviceBackend::DeviceBackend(Devices devices, const calib::Board& board, std::at
       captured_at_(devices_.cameras.size()),
       period_s_(devices_.cameras.size(), 0) {}
 
-Surroundings DeviceBackend::surroundings(ImageWriter* writer) {
-  return {.hold = [this](int, const Surroundings::Seen& seen) { return hold(seen); },
-          .stage = {.show =
-                        [this](int projector, const cv::Mat& image) {
-                          return show(static_cast<std::size_t>(projector), image);
-                        },
-                    .grab = [this](int camera) { return grab(static_cast<std::size_t>(camera)); },
-                    .store = [writer](const std::filesystem::path& path,
-                                      const cv::Mat& image) { return writer->store(path, image); }},
-          .written = [writer] { return writer->finish(); },
+WizardBackend DeviceBackend::backend(ImageWriter* writer) {
+  return {.wait_for_board =
+              [this](int, const WizardBackend::OnImage& on_image) { return wait_for_board(on_image); },
+          .capture = {.show =
+                          [this](int projector, const cv::Mat& image) {
+                            return show(static_cast<std::size_t>(projector), image);
+                          },
+                      .grab = [this](int camera) { return grab(static_cast<std::size_t>(camera)); },
+                      .store = [writer](const std::filesystem::path& path,
+                                        const cv::Mat& image) { return writer->store(path, image); }},
+          .wait_for_files = [writer] { return writer->finish(); },
           .now = devices_.now,
-          .stand = [this](const Surroundings::Seen& seen) { return stand(seen); },
-          .paint = [this](const std::vector<cv::Mat>& images) { return paint(images); },
+          .wait_for_prototype =
+              [this](const WizardBackend::OnImage& on_image) { return wait_for_prototype(on_image); },
+          .show_all = [this](const std::vector<cv::Mat>& images) { return show_all(images); },
           .flashes =
               [this](int projector, int camera) {
                 device::Display* display = devices_.projectors.at(static_cast<std::size_t>(projector)).get();
                 const Status dark = light_all(0);
-                return FlashStage{.show = [display, dark](bool white) -> Result<Stamp> {
-                                    LIMN_TRY_STATUS(dark);
-                                    return display->show(level(*display, white ? 255 : 0));
-                                  },
-                                  .next = [this, camera] { return next(static_cast<std::size_t>(camera)); },
-                                  .wait = devices_.wait};
+                return FlashDevices{.show = [display, dark](bool white) -> Result<Stamp> {
+                                      LIMN_TRY_STATUS(dark);
+                                      return display->show(level(*display, white ? 255 : 0));
+                                    },
+                                    .next = [this, camera] { return next(static_cast<std::size_t>(camera)); },
+                                    .wait = devices_.wait};
               },
           .use_latency =
               [this](int projector, double seconds) {
@@ -114,15 +116,15 @@ Result<cv::Mat> DeviceBackend::grab(std::size_t camera) {
 
 // Lights the board with all projectors until it is still in a new place for at least one camera and moves for
 // no camera.
-Status DeviceBackend::hold(const Surroundings::Seen& seen) {
+Status DeviceBackend::wait_for_board(const WizardBackend::OnImage& on_image) {
   LIMN_TRY_STATUS(light_all(255));
   for (;;) {
     bool is_still = false, is_moving = false;
     for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
       LIMN_TRY(const Frame frame, next(i));
       const auto corners = calib::find_board(board_, to_grey(frame.image));
-      if (seen) seen(static_cast<int>(i), frame.image, corners);
-      const StillBoard::State state = boards_[i].take(corners, frame.captured_at);
+      if (on_image) on_image(static_cast<int>(i), frame.image, corners);
+      const StillBoard::State state = boards_[i].add_corners(corners, frame.captured_at);
       is_still |= state == StillBoard::State::still;
       is_moving |= state == StillBoard::State::moving;
     }
@@ -136,7 +138,7 @@ Status DeviceBackend::hold(const Surroundings::Seen& seen) {
 
 // Waits until no camera sees the board and nothing moves in any image, or until a person says that the
 // prototype is in place.
-Result<bool> DeviceBackend::stand(const Surroundings::Seen& seen) {
+Result<bool> DeviceBackend::wait_for_prototype(const WizardBackend::OnImage& on_image) {
   LIMN_TRY_STATUS(light_all(255));
   std::vector<StillRoom> rooms(devices_.cameras.size());
   for (;;) {
@@ -144,8 +146,8 @@ Result<bool> DeviceBackend::stand(const Surroundings::Seen& seen) {
     for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
       LIMN_TRY(const Frame frame, next(i));
       const auto corners = calib::find_board(board_, to_grey(frame.image));
-      if (seen) seen(static_cast<int>(i), frame.image, corners);
-      is_still &= rooms[i].take(frame.image, frame.captured_at) && corners.empty();
+      if (on_image) on_image(static_cast<int>(i), frame.image, corners);
+      is_still &= rooms[i].add_image(frame.image, frame.captured_at) && corners.empty();
     }
     const WizardWish wish = wish_ ? wish_->exchange(WizardWish::none) : WizardWish::none;
     if (wish == WizardWish::leave || wish == WizardWish::skip || wish == WizardWish::finish) return false;
@@ -153,7 +155,7 @@ Result<bool> DeviceBackend::stand(const Surroundings::Seen& seen) {
   }
 }
 
-Status DeviceBackend::paint(const std::vector<cv::Mat>& images) {
+Status DeviceBackend::show_all(const std::vector<cv::Mat>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     const auto shown_at = devices_.projectors[i]->show(images[i]);
     if (!shown_at) return shown_at.error();

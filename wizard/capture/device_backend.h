@@ -16,7 +16,7 @@
 
 namespace limn::apps {
 
-/// Real cameras and projectors as the wizard's surroundings. Displays must be opened with a latency of 0,
+/// Real cameras and projectors as the wizard's backend. Displays must be opened with a latency of 0,
 /// because the wizard measures it.
 class DeviceBackend {
  public:
@@ -30,12 +30,12 @@ class DeviceBackend {
   DeviceBackend(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish);
 
   /// They refer to this object, which must not move or end before them. Images go to `writer`.
-  Surroundings surroundings(ImageWriter* writer);
+  WizardBackend backend(ImageWriter* writer);
 
  private:
-  Status hold(const Surroundings::Seen& seen);
-  Result<bool> stand(const Surroundings::Seen& seen);
-  Status paint(const std::vector<cv::Mat>& images);
+  Status wait_for_board(const WizardBackend::OnImage& on_image);
+  Result<bool> wait_for_prototype(const WizardBackend::OnImage& on_image);
+  Status show_all(const std::vector<cv::Mat>& images);
   Status show(std::size_t projector, const cv::Mat& image);
   Status light_all(int level);
   Result<cv::Mat> grab(std::size_t camera);

@@ -21,21 +21,21 @@ struct Levels {
 };
 
 // Changes the light and returns the last frame after `seconds`. Also measures the frame period.
-Result<Frame> settled(const FlashStage& stage, bool white, double seconds, double* period_s) {
-  LIMN_TRY(const Stamp shown_at, stage.show(white));
-  LIMN_TRY(Frame frame, stage.next());
+Result<Frame> settled(const FlashDevices& devices, bool white, double seconds, double* period_s) {
+  LIMN_TRY(const Stamp shown_at, devices.show(white));
+  LIMN_TRY(Frame frame, devices.next());
   while (seconds_between(shown_at, frame.captured_at) < seconds) {
     const Stamp before = frame.captured_at;
-    LIMN_TRY(frame, stage.next());
+    LIMN_TRY(frame, devices.next());
     *period_s = seconds_between(before, frame.captured_at);
   }
   return frame;
 }
 
-Result<Levels> levels_of(const FlashStage& stage, double limit_s) {
+Result<Levels> levels_of(const FlashDevices& devices, double limit_s) {
   Levels levels;
-  LIMN_TRY(const Frame dark, settled(stage, false, limit_s, &levels.period_s));
-  LIMN_TRY(const Frame bright, settled(stage, true, limit_s, &levels.period_s));
+  LIMN_TRY(const Frame dark, settled(devices, false, limit_s, &levels.period_s));
+  LIMN_TRY(const Frame bright, settled(devices, true, limit_s, &levels.period_s));
   const cv::Mat black = to_grey(dark.image), white = to_grey(bright.image);
   cv::Mat difference;
   cv::subtract(white, black, difference);
@@ -57,11 +57,11 @@ struct Span {
   double low = 0, high = 0;
 };
 
-Result<Span> flash(const FlashStage& stage, const Levels& levels, bool white, double limit_s) {
-  LIMN_TRY(const Stamp shown_at, stage.show(white));
+Result<Span> flash(const FlashDevices& devices, const Levels& levels, bool white, double limit_s) {
+  LIMN_TRY(const Stamp shown_at, devices.show(white));
   double before_s = 0;
   while (before_s < limit_s) {
-    LIMN_TRY(const Frame frame, stage.next());
+    LIMN_TRY(const Frame frame, devices.next());
     const double at_s = seconds_between(shown_at, frame.captured_at);
     if ((levels.lit_share(to_grey(frame.image)) > 0.5) == white) return Span{before_s, at_s};
     before_s = std::max(0.0, at_s);
@@ -90,13 +90,13 @@ DisplayLatency most_agreed(const std::vector<Span>& spans) {
 
 }  // namespace
 
-Result<DisplayLatency> measured_latency(const FlashStage& stage, const FlashOptions& options) {
+Result<DisplayLatency> measured_latency(const FlashDevices& devices, const FlashOptions& options) {
   LIMN_CHECK(options.flashes > 0 && options.limit_s > 0);
-  LIMN_TRY(const Levels levels, levels_of(stage, options.limit_s));
+  LIMN_TRY(const Levels levels, levels_of(devices, options.limit_s));
   std::vector<Span> spans;
   for (int i = 0; i < options.flashes; ++i) {
-    stage.wait(levels.period_s * i / options.flashes);
-    LIMN_TRY(const Span span, flash(stage, levels, i % 2 == 1, options.limit_s));
+    devices.wait(levels.period_s * i / options.flashes);
+    LIMN_TRY(const Span span, flash(devices, levels, i % 2 == 1, options.limit_s));
     spans.push_back(span);
   }
   const DisplayLatency latency = most_agreed(spans);

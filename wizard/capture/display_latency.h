@@ -8,7 +8,7 @@
 namespace limn::apps {
 
 /// A display that flashes, and a camera that sees its light.
-struct FlashStage {
+struct FlashDevices {
   /// Shows all white or all black; returns the moment from which the latency counts.
   std::function<Result<Stamp>(bool white)> show;
   std::function<Result<Frame>()> next;       ///< the camera's next frame, with a correct captured_at
@@ -32,6 +32,6 @@ struct DisplayLatency {
 /// them allow is returned. A frame counts as bright from half brightness on: then the light has appeared at
 /// the middle of its exposure, which is its stamp. Error: the camera does not see the light, or fewer than
 /// half of the flashes agree.
-Result<DisplayLatency> measured_latency(const FlashStage& stage, const FlashOptions& options = {});
+Result<DisplayLatency> measured_latency(const FlashDevices& devices, const FlashOptions& options = {});
 
 }  // namespace limn::apps

@@ -103,13 +103,13 @@ cv::Mat squares(int width, int height) {
 }
 
 Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures,
-                                                       const calib::CaptureBackend& stage) {
+                                                       const calib::CaptureBackend& capture) {
   std::vector<ExposureReading> all;
   const auto grabbed = [&](int projector, const cv::Mat& image) -> Result<std::vector<cv::Mat>> {
-    LIMN_TRY_STATUS(stage.show(projector, image));
+    LIMN_TRY_STATUS(capture.show(projector, image));
     std::vector<cv::Mat> images;
     for (std::size_t i = 0; i < captures.cameras.size(); ++i) {
-      LIMN_TRY(cv::Mat one, stage.grab(static_cast<int>(i)));
+      LIMN_TRY(cv::Mat one, capture.grab(static_cast<int>(i)));
       images.push_back(one.clone());
     }
     return images;
@@ -134,7 +134,7 @@ Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& 
 
 std::vector<std::string> unseen(const std::vector<ExposureReading>& seen) {
   std::map<std::string, double> most;
-  for (const ExposureReading& one : seen) most[one.projector] = std::max(most[one.projector], one.lit);
+  for (const ExposureReading& one : seen) most[one.projector] = std::max(most[one.projector], one.on_light);
   std::vector<std::string> sentences;
   for (const auto& [projector, lit] : most)
     if (lit < k_least_lit)

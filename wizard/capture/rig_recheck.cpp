@@ -166,15 +166,15 @@ Result<CheckedRig> recheck_rig(const Rig& rig,
   return checked;
 }
 
-Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Surroundings& around) {
+Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const WizardBackend& backend) {
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   const Json latencies_ms = provenance_of(rig).value("display_latency_ms", Json::object());
   for (std::size_t i = 0; i < captures.projectors.size(); ++i)
     if (const auto ms = latencies_ms.find(captures.projectors[i].name);
         ms != latencies_ms.end() && ms->is_number())
-      around.use_latency(static_cast<int>(i), 1e-3 * ms->get<double>() + k_guard_s);
-  const Status taken = calib::capture_pose(captures, 0, around.stage);
-  const Status written = around.written();
+      backend.use_latency(static_cast<int>(i), 1e-3 * ms->get<double>() + k_guard_s);
+  const Status taken = calib::capture_pose(captures, 0, backend.capture);
+  const Status written = backend.wait_for_files();
   return taken ? written : taken;
 }
 
@@ -188,7 +188,7 @@ int recheck_images(const Rig& rig) {
 }
 
 Result<Rechecked> rechecked_in_place(const Rig& rig,
-                                     const Surroundings& around,
+                                     const WizardBackend& backend,
                                      const fs::path& folder,
                                      const std::function<bool()>& should_continue) {
   LIMN_TRY(const calib::Board board, calibration_board(rig));
@@ -200,7 +200,7 @@ Result<Rechecked> rechecked_in_place(const Rig& rig,
   const fs::path captures = folder / "captures";
   LIMN_TRY_STATUS(captured_once(calib::plan_captures(captures, devices(rig.cameras), devices(rig.projectors),
                                                      board, k_code_in_place, k_sparse),
-                                rig, around));
+                                rig, backend));
   LIMN_TRY(CheckedRig checked, recheck_rig(rig, captures, {}, folder, should_continue));
   LIMN_TRY_STATUS(check_explained(checked.rechecked.result));
   LIMN_TRY_STATUS(save_rig(checked.rechecked.result.rig, folder));

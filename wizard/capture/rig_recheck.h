@@ -42,17 +42,17 @@ Status check_explained(const calib::RigCheck& result);
 /// The board that the rig was calibrated with; a default board if its provenance names none.
 Result<calib::Board> calibration_board(const Rig& rig);
 
-/// Captures one pose of whatever stands in front of the devices of `around` into the captures' folder, with
+/// Captures one pose of whatever stands in front of the devices of `backend` into the captures' folder, with
 /// the display latencies in the rig's provenance.
-Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const Surroundings& around);
+Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const WizardBackend& backend);
 
-/// Captures the prototype once as it stands and checks the rig with it. The devices of `around` are already
+/// Captures the prototype once as it stands and checks the rig with it. The devices of `backend` are already
 /// open and have the rig's names and order; only stage, written and use_latency are needed. The result's rig
 /// is the corrected one; it, recheck.json and captures/ are written to `folder`. Error, and no rig is
 /// written: no move of a single device explains the observations, or `should_continue`, which is called from
 /// time to time, returns false.
 Result<Rechecked> rechecked_in_place(const Rig& rig,
-                                     const Surroundings& around,
+                                     const WizardBackend& backend,
                                      const std::filesystem::path& folder,
                                      const std::function<bool()>& should_continue = {});
 

@@ -36,7 +36,7 @@ double diagonal(const Corners& corners) {
 
 }  // namespace
 
-StillBoard::State StillBoard::take(const std::vector<calib::BoardCorner>& corners, Stamp at) {
+StillBoard::State StillBoard::add_corners(const std::vector<calib::BoardCorner>& corners, Stamp at) {
   last_.clear();
   for (const calib::BoardCorner& corner : corners) last_[corner.id] = corner.px;
   if (last_.size() < k_least_corners) {

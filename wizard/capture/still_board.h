@@ -14,7 +14,7 @@ class StillBoard {
   enum class State { unseen, moving, known, still };  ///< known: still where it was captured last
 
   /// Adds the corners of the next frame; stamps must not decrease.
-  State take(const std::vector<calib::BoardCorner>& corners, Stamp at);
+  State add_corners(const std::vector<calib::BoardCorner>& corners, Stamp at);
   /// The board has been captured where it is now; the next place must be a different one.
   void captured() { captured_ = last_; }
 

@@ -13,7 +13,7 @@ constexpr double k_share = 0.002;  // share of the image; a hand at its edge cha
 
 }  // namespace
 
-bool StillRoom::take(const cv::Mat& image, Stamp at) {
+bool StillRoom::add_image(const cv::Mat& image, Stamp at) {
   cv::Mat small;
   cv::resize(to_grey(image), small, {k_width, std::max(1, k_width * image.rows / image.cols)}, 0, 0,
              cv::INTER_AREA);

@@ -13,7 +13,7 @@ class StillRoom {
   static constexpr double k_rest_s = 8;
 
   /// Adds the next frame, 8-bit grey or BGR; stamps must not decrease. True: nothing has moved for k_rest_s.
-  bool take(const cv::Mat& image, Stamp at);
+  bool add_image(const cv::Mat& image, Stamp at);
 
  private:
   cv::Mat still_;  // small grey image at `since_`

@@ -15,7 +15,7 @@ namespace {
 constexpr double k_guard_s = 0.001;  // added to a measured latency
 
 // A virtual rig's devices and the latencies measured so far.
-struct VirtualStage {
+struct VirtualBackend {
   sim::VirtualRig* rig = nullptr;
   std::vector<double> latency_s;  // latency of each projector
   std::vector<cv::Mat> frames;    // one exposure of all cameras; an image is empty once grabbed
@@ -41,8 +41,8 @@ struct VirtualStage {
     return std::exchange(wanted, cv::Mat());
   }
 
-  // Gives `seen` every camera's image of the board in white light.
-  Status look(const calib::Board& board, const Surroundings::Seen& seen) {
+  // Gives `on_image` every camera's image of the board in white light.
+  Status report_board_images(const calib::Board& board, const WizardBackend::OnImage& on_image) {
     LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
     for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
       const cv::Mat image = grab(i);
@@ -52,15 +52,15 @@ struct VirtualStage {
   }
 
   // Removes the board and puts the prototype back where the world has it.
-  Result<bool> stand(const Surroundings::Seen& seen) {
+  Result<bool> wait_for_prototype(const WizardBackend::OnImage& on_image) {
     rig->remove("board");
     rig->restore_prototype();
     LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
-    for (int i = 0; seen && i < static_cast<int>(frames.size()); ++i) seen(i, grab(i), {});
+    for (int i = 0; on_image && i < static_cast<int>(frames.size()); ++i) on_image(i, grab(i), {});
     return true;
   }
 
-  Status paint(const std::vector<cv::Mat>& images) {
+  Status show_all(const std::vector<cv::Mat>& images) {
     for (std::size_t i = 0; i < images.size(); ++i) {
       const auto shown = rig->projector(static_cast<int>(i)).show(images[i]);
       if (!shown) return shown.error();
@@ -70,7 +70,7 @@ struct VirtualStage {
     return {};
   }
 
-  FlashStage flashes(int projector, int camera) {
+  FlashDevices flashes(int projector, int camera) {
     rig->darken();
     const auto show = [r = rig, projector](bool white) -> Result<Stamp> {
       const Stamp at = r->now();
@@ -86,31 +86,34 @@ struct VirtualStage {
 
 }  // namespace
 
-Surroundings virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer) {
-  const auto stage = std::make_shared<VirtualStage>();
-  stage->rig = rig;
-  stage->latency_s.resize(rig->world().rig.projectors.size(), FlashOptions().limit_s);
-  stage->frames.resize(rig->world().rig.cameras.size());
-  return {.hold = [&plan, stage](int pose, const Surroundings::Seen& seen) -> Status {
-            const Pose& place = plan.world_from_board[static_cast<std::size_t>(pose)];
-            stage->rig->place(board_object(plan.board, place));
-            return seen ? stage->look(plan.board, seen) : Status();
-          },
-          .stage = {.show = [stage](int p, const cv::Mat& image) { return stage->show(p, image); },
-                    .grab = [stage](int camera) -> Result<cv::Mat> { return stage->grab(camera); },
-                    .store = [writer](const std::filesystem::path& path,
-                                      const cv::Mat& image) { return writer->store(path, image); }},
-          .written = [writer] { return writer->finish(); },
-          .now = [rig] { return rig->now(); },
-          .stand = rig->world().scene && rig->world().scene->prototype
-                       ? [stage](const Surroundings::Seen& seen) { return stage->stand(seen); }
-                       : std::function<Result<bool>(const Surroundings::Seen&)>(),
-          .paint = [stage](const std::vector<cv::Mat>& images) { return stage->paint(images); },
-          .flashes = [stage](int projector, int camera) { return stage->flashes(projector, camera); },
-          .use_latency =
-              [stage](int projector, double seconds) {
-                stage->latency_s.at(static_cast<std::size_t>(projector)) = seconds;
-              }};
+WizardBackend virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer) {
+  const auto backend = std::make_shared<VirtualBackend>();
+  backend->rig = rig;
+  backend->latency_s.resize(rig->world().rig.projectors.size(), FlashOptions().limit_s);
+  backend->frames.resize(rig->world().rig.cameras.size());
+  return {
+      .wait_for_board = [&plan, backend](int pose, const WizardBackend::OnImage& on_image) -> Status {
+        const Pose& place = plan.world_from_board[static_cast<std::size_t>(pose)];
+        backend->rig->place(board_object(plan.board, place));
+        return on_image ? backend->report_board_images(plan.board, on_image) : Status();
+      },
+      .capture = {.show = [backend](int p, const cv::Mat& image) { return backend->show(p, image); },
+                  .grab = [backend](int camera) -> Result<cv::Mat> { return backend->grab(camera); },
+                  .store = [writer](const std::filesystem::path& path,
+                                    const cv::Mat& image) { return writer->store(path, image); }},
+      .wait_for_files = [writer] { return writer->finish(); },
+      .now = [rig] { return rig->now(); },
+      .wait_for_prototype =
+          rig->world().scene && rig->world().scene->prototype
+              ? [backend](
+                    const WizardBackend::OnImage& on_image) { return backend->wait_for_prototype(on_image); }
+              : std::function<Result<bool>(const WizardBackend::OnImage&)>(),
+      .show_all = [backend](const std::vector<cv::Mat>& images) { return backend->show_all(images); },
+      .flashes = [backend](int projector, int camera) { return backend->flashes(projector, camera); },
+      .use_latency =
+          [backend](int projector, double seconds) {
+            backend->latency_s.at(static_cast<std::size_t>(projector)) = seconds;
+          }};
 }
 
 }  // namespace limn::apps

@@ -7,8 +7,8 @@
 
 namespace limn::apps {
 
-/// A virtual rig (with grab_waits_for_light off) as the wizard's surroundings: the board is at once where the
+/// A virtual rig (with grab_waits_for_light off) as the wizard's backend: the board is at once where the
 /// plan puts it. All three arguments must outlive the result; images go to `writer`.
-Surroundings virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer);
+WizardBackend virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWriter* writer);
 
 }  // namespace limn::apps

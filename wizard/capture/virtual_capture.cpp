@@ -23,14 +23,14 @@ Status capture_poses(const calib::CaptureSet& captures,
   ImageWriter writer;
   int done_before = 0;
   std::optional<Progress> progress;
-  const calib::CaptureBackend stage = stage_of(rig, &writer, [&](int done, int total) {
+  const calib::CaptureBackend capture = capture_backend(rig, &writer, [&](int done, int total) {
     if (!progress) progress.emplace("capture", total * pose_count);
     progress->step(done_before + done);
     if (done == total) done_before += total;
   });
   for (int pose = 0; pose < pose_count; ++pose) {
     set_up(pose);
-    LIMN_TRY_STATUS(calib::capture_pose(captures, pose, stage));
+    LIMN_TRY_STATUS(calib::capture_pose(captures, pose, capture));
   }
   rig->darken();
   return writer.finish();
@@ -52,9 +52,9 @@ Result<calib::CaptureSet> planned(const Plan& plan,
   return captures;
 }
 
-calib::CaptureBackend stage_of(sim::VirtualRig* rig,
-                               ImageWriter* writer,
-                               calib::ReportProgress report_progress) {
+calib::CaptureBackend capture_backend(sim::VirtualRig* rig,
+                                      ImageWriter* writer,
+                                      calib::ReportProgress report_progress) {
   return {.show = [rig](int projector, const cv::Mat& image) -> Status {
             rig->darken();
             const auto shown_at = rig->projector(projector).show(image);
@@ -72,11 +72,11 @@ calib::CaptureBackend stage_of(sim::VirtualRig* rig,
 Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig) {
   ImageWriter writer;
   std::optional<Progress> progress;
-  const calib::CaptureBackend stage = stage_of(rig, &writer, [&](int done, int total) {
+  const calib::CaptureBackend capture = capture_backend(rig, &writer, [&](int done, int total) {
     if (!progress) progress.emplace("response", total);
     progress->step(done);
   });
-  LIMN_TRY_STATUS(calib::capture_response(captures, stage));
+  LIMN_TRY_STATUS(calib::capture_response(captures, capture));
   rig->darken();
   return writer.finish();
 }

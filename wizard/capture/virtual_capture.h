@@ -21,9 +21,9 @@ Result<calib::CaptureSet> planned(const Plan& plan,
                                   const std::filesystem::path& out);
 
 /// The rig's devices as a capture backend; images go to `writer`.
-calib::CaptureBackend stage_of(sim::VirtualRig* rig,
-                               ImageWriter* writer,
-                               calib::ReportProgress report_progress);
+calib::CaptureBackend capture_backend(sim::VirtualRig* rig,
+                                      ImageWriter* writer,
+                                      calib::ReportProgress report_progress);
 
 /// Captures the response images of whatever stands in front of the rig.
 Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig);

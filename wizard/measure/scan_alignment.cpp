@@ -200,7 +200,7 @@ Result<MeshAligned> align(const AlignOptions& command,
 
 std::string text_of(const calib::Difference& d) {
   return fmt::format(
-      "{:.1f} cm2 around ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan lies {:.1f} mm {} the CAD "
+      "{:.1f} cm2 backend ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan lies {:.1f} mm {} the CAD "
       "(up to {:.1f} mm)",
       1e4 * d.area_m2, 1e3 * d.p_prototype.x(), 1e3 * d.p_prototype.y(), 1e3 * d.p_prototype.z(),
       1e3 * std::abs(d.mean_m), d.mean_m > 0 ? "outside" : "inside", 1e3 * std::abs(d.worst_m));

@@ -17,9 +17,9 @@ using State = WizardState;
 constexpr auto k_pause = std::chrono::milliseconds(2);  // maximum wait for the executor
 
 // The state that the worker thread and the window share.
-class Stand {
+class Progress {
  public:
-  Stand(const WizardPlan& plan, std::atomic<WizardWish>* wish)
+  Progress(const WizardPlan& plan, std::atomic<WizardWish>* wish)
       : plan_(plan), targets_(plan.targets), wish_(wish) {
     step(WizardStep::devices) = {State::done, plan.devices};
     for (const calib::CapturedDevice& camera : plan.captures.cameras)
@@ -41,7 +41,7 @@ class Stand {
     view_.is_leaving = true;
   }
 
-  WizardAudience audience(const std::function<void(const std::string&)>& say) {
+  WizardListener listener(const std::function<void(const std::string&)>& say) {
     return {.say = say,
             .step =
                 [this](WizardStep which, State state, const std::string& words) {
@@ -51,7 +51,7 @@ class Stand {
                                  is_pose ? fmt::format("pose {} of {}", view_.pose + 1, view_.poses) : words};
                   view_.is_capturing &= which != WizardStep::solve;
                 },
-            .lit =
+            .on_light =
                 [this](const std::vector<ExposureReading>& light) {
                   const std::lock_guard lock(mutex_);
                   view_.light = light;
@@ -59,8 +59,11 @@ class Stand {
             .aims = [this](int pose) { aims(pose); },
             .solved = [this](const calib::Report& report) { solved(report, view_.judged.size()); },
             .judges = [this](int pose) { judges(pose); },
-            .judged = [this](const PoseJudged& judged, const calib::Observations& observations,
-                             const std::vector<calib::Fault>& faults) { take(judged, observations, faults); },
+            .judged =
+                [this](const PoseJudged& judged, const calib::Observations& observations,
+                       const std::vector<calib::Fault>& faults) {
+                  add_judged_pose(judged, observations, faults);
+                },
             .wish = wish_};
   }
 
@@ -84,22 +87,22 @@ class Stand {
     view_.advice.clear();
   }
 
-  // The same surroundings; their images are copied into the view.
-  Surroundings watched(Surroundings around) {
-    const auto grab = around.stage.grab;
-    around.stage.grab = [this, grab](int camera) -> Result<cv::Mat> {
+  // The same backend; its images are copied into the view.
+  WizardBackend with_live_view(WizardBackend backend) {
+    const auto grab = backend.capture.grab;
+    backend.capture.grab = [this, grab](int camera) -> Result<cv::Mat> {
       LIMN_TRY(const cv::Mat image, grab(camera));
       const std::lock_guard lock(mutex_);
       view_.cameras[static_cast<std::size_t>(camera)].image = image;
       return image;
     };
-    around.stage.report_progress = [this](int done, int total) {
+    backend.capture.report_progress = [this](int done, int total) {
       const std::lock_guard lock(mutex_);
       view_.images = done;
       view_.images_of = total;
     };
-    around.flashes = [this, flashes = around.flashes](int projector, int camera) {
-      FlashStage flash = flashes(projector, camera);
+    backend.flashes = [this, flashes = backend.flashes](int projector, int camera) {
+      FlashDevices flash = flashes(projector, camera);
       flash.next = [this, next = flash.next, camera]() -> Result<Frame> {
         LIMN_TRY(Frame frame, next());
         const std::lock_guard lock(mutex_);
@@ -108,25 +111,25 @@ class Stand {
       };
       return flash;
     };
-    const Surroundings::Seen seen = [this](int camera, const cv::Mat& image,
-                                           const std::vector<calib::BoardCorner>& corners) {
+    const WizardBackend::OnImage on_image = [this](int camera, const cv::Mat& image,
+                                                   const std::vector<calib::BoardCorner>& corners) {
       const std::lock_guard lock(mutex_);
       WizardView::Camera& shown = view_.cameras.at(static_cast<std::size_t>(camera));
       shown.image = image;
       shown.corners.clear();
       for (const calib::BoardCorner& corner : corners) shown.corners.push_back(corner.px);
     };
-    around.hold = [hold = around.hold, seen](int pose, const Surroundings::Seen&) {
-      return hold(pose, seen);
-    };
-    if (around.stand)
-      around.stand = [this, stand = around.stand, seen](const Surroundings::Seen&) {
+    backend.wait_for_board = [wait = backend.wait_for_board, on_image](
+                                 int pose, const WizardBackend::OnImage&) { return wait(pose, on_image); };
+    if (backend.wait_for_prototype)
+      backend.wait_for_prototype = [this, wait = backend.wait_for_prototype,
+                                    on_image](const WizardBackend::OnImage&) {
         await_prototype(true);
-        auto stands = stand(seen);
+        auto stands = wait(on_image);
         await_prototype(false);
         return stands;
       };
-    return around;
+    return backend;
   }
 
   void end(const Result<Calibrated>& done) {
@@ -175,9 +178,9 @@ class Stand {
     view_.is_capturing = false;
   }
 
-  void take(const PoseJudged& judged,
-            const calib::Observations& observations,
-            const std::vector<calib::Fault>& faults) {
+  void add_judged_pose(const PoseJudged& judged,
+                       const calib::Observations& observations,
+                       const std::vector<calib::Fault>& faults) {
     const std::lock_guard lock(mutex_);
     WizardView::Judged row{judged.pose, std::nullopt, std::nullopt};
     if (judged.assessment) {
@@ -216,19 +219,19 @@ class Stand {
 
 Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         const WizardPlan& plan,
-                                        const Surroundings& surroundings,
+                                        const WizardBackend& backend,
                                         const std::function<void(const std::string&)>& say,
                                         std::atomic<WizardWish>* wish,
                                         MainThreadExecutor* executor,
                                         const WizardWork& work) {
-  Stand stand(plan, wish);
+  Progress progress(plan, wish);
   auto running = std::async(std::launch::async, [&]() -> Result<Calibrated> {
     try {
-      Result<Calibrated> done = work(stand.watched(surroundings), stand.audience(say));
-      stand.end(done);
+      Result<Calibrated> done = work(progress.with_live_view(backend), progress.listener(say));
+      progress.end(done);
       return done;
     } catch (const std::exception& bug) {
-      stand.end(error("this is a bug in Limn, please report it: {}", bug.what()));
+      progress.end(error("this is a bug in Limn, please report it: {}", bug.what()));
       throw;
     }
   });
@@ -239,12 +242,12 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
       std::this_thread::sleep_for(k_pause);
       continue;
     }
-    const WizardView view = stand.view();
+    const WizardView view = progress.view();
     WizardWish asked = WizardWish::none;
     window->draw([&](Gui& gui) { asked = draw_wizard(gui, view); });
     if (!window->is_wanted()) asked = WizardWish::leave;
     is_closed = asked == WizardWish::leave && (view.is_over || !window->is_wanted());
-    if (asked != WizardWish::none && !view.is_over) stand.wish(asked);
+    if (asked != WizardWish::none && !view.is_over) progress.wish(asked);
   }
   while (running.wait_for(k_pause) != std::future_status::ready) executor->serve();
   return running.get();
