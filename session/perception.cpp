@@ -227,7 +227,7 @@ void Perception::read_gestures(std::span<const std::size_t> cameras) {
       if (steps[i] == 0) continue;
       const bool is_seen_elsewhere =
           !gestures[i].is_seen() &&
-          std::any_of(camera_states_.begin(), camera_states_.end(), [&](const Eye& other) {
+          std::any_of(camera_states_.begin(), camera_states_.end(), [&](const CameraState& other) {
             return &other.gestures != &gestures && other.gestures[i].is_seen();
           });
       const bool is_arms = std::any_of(gestures.begin(), gestures.end(), [&](const auto& other) {

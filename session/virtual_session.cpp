@@ -185,11 +185,11 @@ class VirtualCapture final : public CaptureDevices {
  public:
   VirtualCapture(sim::VirtualRig* rig, VirtualSource* source) : rig_(rig), source_(source) {}
 
-  Surroundings surroundings(ImageWriter* writer) override {
-    Surroundings around = virtual_backend(no_board_, rig_, writer);
+  WizardBackend backend(ImageWriter* writer) override {
+    WizardBackend out = virtual_backend(no_board_, rig_, writer);
     for (std::size_t i = 0; i < rig_->world().rig.projectors.size(); ++i)
-      around.use_latency(static_cast<int>(i), k_virtual_display_s);
-    return around;
+      out.use_latency(static_cast<int>(i), k_virtual_display_s);
+    return out;
   }
   void pause_perception(Session*) override { source_->pause(true); }
   void resume_perception() override { source_->pause(false); }

@@ -51,7 +51,7 @@ struct Results {
 };
 
 struct PatternKernels {
-  void (*see)(const Guess&, const Places&, std::size_t count, const Results&);
+  void (*evaluate)(const Guess&, const Places&, std::size_t count, const Results&);
   /// Sets shows[i] to a value other than 0 where the light of a pixel changes.
   void (*find_edges)(const Guess&, const float* x, const float* y, std::size_t count, std::int32_t* shows);
 };

@@ -364,7 +364,7 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
     std::vector<fs::path> shown;
     auto repair = std::make_unique<apps::LiveRecalibration>(
         setup.rig, folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
-          apps::Surroundings around;
+          apps::WizardBackend around;
           around.stage.show = [&](int projector, const cv::Mat&) -> Status {
             const fs::path images =
                 folder / fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);

@@ -134,7 +134,7 @@ Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& 
 
 std::vector<std::string> unseen(const std::vector<ExposureReading>& seen) {
   std::map<std::string, double> most;
-  for (const ExposureReading& one : seen) most[one.projector] = std::max(most[one.projector], one.on_light);
+  for (const ExposureReading& one : seen) most[one.projector] = std::max(most[one.projector], one.lit);
   std::vector<std::string> sentences;
   for (const auto& [projector, lit] : most)
     if (lit < k_least_lit)

@@ -46,7 +46,7 @@ struct VirtualBackend {
     LIMN_TRY_STATUS(show(0, cv::Mat(rig->projector(0).size(), CV_8UC1, cv::Scalar(255))));
     for (int i = 0; i < static_cast<int>(frames.size()); ++i) {
       const cv::Mat image = grab(i);
-      seen(i, image, calib::find_board(board, to_grey(image)));
+      on_image(i, image, calib::find_board(board, to_grey(image)));
     }
     return {};
   }
