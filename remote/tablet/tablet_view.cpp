@@ -320,7 +320,7 @@ cv::Mat TabletView::Impl::with_parts(const Imager& camera,
     for (projector::CompositePolicy& treatment : shown->policies) {
       if (as_screen && !shown->is_viewer && known.scene->find_slot(treatment.slot)->mode == scene::Mode::view)
         treatment = {treatment.slot, projector::Composite::full};
-      if (treatment.whole() > 0) continue;
+      if (treatment.full_weight() > 0) continue;
       for (const projector::PartCoverage& part : coverage)
         if (part.slot == treatment.slot && part.viewer_pixels > 0 && part.off_surface_share == 0)
           shown->by_light_alone.insert(part.slot);
