@@ -110,13 +110,13 @@ cv::Mat pixel_map(const Imager& imager, const TangentRect& rect, int columns, in
 cv::Rect pixels_of(const Imager& imager, const BakedLens& lens, const TangentRect& rect) {
   constexpr int k_nodes = 17;        // nodes for each side; a lens bends lines little between them
   constexpr double k_margin_px = 4;  // for this bending, and because a pixel sees more than its centre
-  const TangentRect seen = intersected(rect, lens.rect);
-  if (seen.is_empty()) return {};
+  const TangentRect visible = intersected(rect, lens.rect);
+  if (visible.is_empty()) return {};
   Eigen::AlignedBox2d box;
   for (int row = 0; row < k_nodes; ++row)
     for (int column = 0; column < k_nodes; ++column) {
       const Eigen::Vector2d share(1.0 * column / (k_nodes - 1), 1.0 * row / (k_nodes - 1));
-      const Eigen::Vector2d tangent = seen.lower + (seen.upper - seen.lower).cwiseProduct(share);
+      const Eigen::Vector2d tangent = visible.lower + (visible.upper - visible.lower).cwiseProduct(share);
       if (const auto px = imager.lens.project(tangent.homogeneous())) box.extend(*px);
     }
   if (box.isEmpty()) return {0, 0, imager.width, imager.height};

@@ -8,7 +8,7 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_nodes = 32;        // as in shaders/look.glsl
+constexpr int k_nodes = 32;        // as in shaders/shading.glsl
 constexpr int k_samples = 512;     // samples for each node; 16 times as many change no level in renderer_test
 constexpr double k_horizon = 0.3;  // height at which all light counts as light from above
 constexpr double k_least_roughness = 0.03, k_least_cosine = 1e-3, k_most_cosine = 0.999;
@@ -39,35 +39,35 @@ void for_each_half_vector(double roughness, const Use& use) {
 }
 
 // What is reflected of uniform light from everywhere.
-struct Mirrored {
-  double head_on = 0, white = 0;  // factors of the colour at normal incidence and of white
-  double aside = 0;               // mean direction, from the normal (0) to the mirror direction (1)
+struct SpecularTerms {
+  double f0 = 0, f90 = 0;  // factors of the colour at normal incidence and of white
+  double aside = 0;        // mean direction, from the normal (0) to the mirror direction (1)
 };
 
-Mirrored mirrored(double cosine, double roughness) {
-  const Eigen::Vector3d d_eye(std::sqrt(1 - cosine * cosine), 0, cosine);
+SpecularTerms specular_terms(double cosine, double roughness) {
+  const Eigen::Vector3d d_view(std::sqrt(1 - cosine * cosine), 0, cosine);
   const double a2 = std::pow(roughness, 4);
-  Mirrored sum;
+  SpecularTerms sum;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for_each_half_vector(roughness, [&](const Eigen::Vector3d& h) {
-    const double vh = d_eye.dot(h);
-    const Eigen::Vector3d l = 2 * vh * h - d_eye;
+    const double vh = d_view.dot(h);
+    const Eigen::Vector3d l = 2 * vh * h - d_view;
     if (l.z() <= 0 || vh <= 0) return;
     const double visible = l.z() * std::sqrt(cosine * cosine * (1 - a2) + a2) +
                            cosine * std::sqrt(l.z() * l.z() * (1 - a2) + a2);
-    const double light = 2 * l.z() * vh / (visible * h.z() * k_samples), white = std::pow(1 - vh, 5);
-    sum.head_on += light * (1 - white);
-    sum.white += light * white;
+    const double light = 2 * l.z() * vh / (visible * h.z() * k_samples), schlick = std::pow(1 - vh, 5);
+    sum.f0 += light * (1 - schlick);
+    sum.f90 += light * schlick;
     mean += light * l;
   });
   const double tangent = -mean.x() / mean.z();
-  sum.aside = std::clamp(tangent / (d_eye.x() + tangent * (1 - cosine)), 0.0, 1.0);
+  sum.aside = std::clamp(tangent / (d_view.x() + tangent * (1 - cosine)), 0.0, 1.0);
   return sum;
 }
 
 // The share of light from above in the reflection lobe around a direction of this height; the lobe is that of
 // normal incidence.
-double mirrored_from_above(double height, double roughness) {
+double specular_from_above(double height, double roughness) {
   const double level = std::sqrt(std::max(0.0, 1 - height * height)), a2 = std::pow(roughness, 4);
   double above = 0, all = 0;
   for_each_half_vector(roughness, [&](const Eigen::Vector3d& h) {
@@ -86,9 +86,9 @@ cv::Mat made() {
     const double roughness = std::max(k_least_roughness, 1.0 * row / (k_nodes - 1));
     for (int column = 0; column < k_nodes; ++column) {
       const double x = 1.0 * column / (k_nodes - 1);
-      const Mirrored share = mirrored(std::clamp(x, k_least_cosine, k_most_cosine), roughness);
+      const SpecularTerms share = specular_terms(std::clamp(x, k_least_cosine, k_most_cosine), roughness);
       table.at<cv::Vec4f>(row, column) =
-          cv::Vec4d(share.head_on, share.white, mirrored_from_above(2 * x - 1, roughness), share.aside);
+          cv::Vec4d(share.f0, share.f90, specular_from_above(2 * x - 1, roughness), share.aside);
     }
   }
   return table;

@@ -39,13 +39,13 @@ Eigen::Matrix3f mixing_at(const ColourMixing& mixing, int row, int column) {
 cv::Vec4f known(const Eigen::Vector3f& v) { return {v.x(), v.y(), v.z(), 1}; }
 
 // Mask of where the projector lights the surface, without a margin at the edges of its light.
-cv::Mat lit_inside(const cv::Mat& irradiance) {
-  cv::Mat lit = irradiance > 0;
-  cv::erode(lit, lit, cv::Mat(), {-1, -1}, k_edge_px, cv::BORDER_CONSTANT, cv::Scalar(0));
-  return lit;
+cv::Mat well_illuminated(const cv::Mat& irradiance) {
+  cv::Mat illuminated = irradiance > 0;
+  cv::erode(illuminated, illuminated, cv::Mat(), {-1, -1}, k_edge_px, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return illuminated;
 }
 
-// Extends known values into unknown pixels around them, far enough to fill the margin of lit_inside.
+// Extends known values into unknown pixels around them, far enough to fill the margin of well_illuminated.
 void spread(cv::Mat* layer) {
   for (int i = 0; i < 2 * k_edge_px; ++i) {
     cv::Mat around;
@@ -64,11 +64,11 @@ double irradiance_at(const Imager& projector,
                      const Vignetting& vignetting,
                      const Eigen::Vector3d& p_world,
                      const Eigen::Vector3d& n_world) {
-  const Eigen::Vector3d to_eye = projector.imager_from_world.inverse().translation - p_world;
-  const double cosine = n_world.dot(to_eye.normalized());
+  const Eigen::Vector3d to_projector = projector.imager_from_world.inverse().translation - p_world;
+  const double cosine = n_world.dot(to_projector.normalized());
   const auto px = projector.project(p_world);
   if (cosine <= 0 || !px || !projector.contains(*px)) return 0;
-  return cosine / to_eye.squaredNorm() * vignetting.gain(*px, projector.width, projector.height);
+  return cosine / to_projector.squaredNorm() * vignetting.gain(*px, projector.width, projector.height);
 }
 
 // The albedo image as linear r, g, b.
@@ -119,10 +119,10 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
   const cv::Size size(surface.camera.width, surface.camera.height);
   SurfaceMixing out;
   for (std::size_t i = 0; i < 3 * count + 1; ++i) out.layers.emplace_back(size, CV_32FC4, cv::Scalar::all(0));
-  std::vector<cv::Mat> lit;
-  for (const cv::Mat& image : irradiance) lit.push_back(lit_inside(image));
+  std::vector<cv::Mat> illuminated;
+  for (const cv::Mat& image : irradiance) illuminated.push_back(well_illuminated(image));
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  std::size_t seen = 0;
+  std::size_t measured = 0;
   std::vector<Eigen::Vector3f> whites;  // of each pixel, with all projectors at white
   for (int row = 0; row < size.height; ++row)
     for (int column = 0; column < size.width; ++column) {
@@ -130,7 +130,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
       Eigen::Vector3f offset = Eigen::Vector3f::Zero();
       int projectors = 0;
       for (std::size_t i = 0; i < count; ++i) {
-        if (!lit[i].at<uchar>(row, column)) continue;
+        if (!illuminated[i].at<uchar>(row, column)) continue;
         const Eigen::Matrix3f mixing = mixing_at(surface.mixings[i], row, column);
         const Eigen::Vector3f by_this = mixing.rowwise().sum();
         if (!mixing.allFinite() || !(by_this.minCoeff() > k_least_light)) continue;
@@ -138,7 +138,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
         for (int c = 0; c < 3; ++c)
           out.layers[3 * i + static_cast<std::size_t>(c)].at<cv::Vec4f>(row, column) = known(at_one.col(c));
         sum += at_one.cast<double>();
-        ++seen;
+        ++measured;
         white += by_this;
         offset += colour_at(surface.mixings[i].offset, row, column);
         ++projectors;
@@ -148,7 +148,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
       out.layers.back().at<cv::Vec4f>(row, column) = known(offset);
       whites.push_back(white + offset);
     }
-  if (seen == 0) {
+  if (measured == 0) {
     return error(
         "colour mixing of camera {}: expected pixels that see projected light on the prototype, found none "
         "where light is predicted from the rig and the prototype's pose. Measure the response again with the "
@@ -156,7 +156,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
         surface.camera.name);
   }
   for (cv::Mat& layer : out.layers) spread(&layer);
-  out.mean = (sum / static_cast<double>(seen)).cast<float>();
+  out.mean = (sum / static_cast<double>(measured)).cast<float>();
   const Eigen::Vector3f mean_white = out.mean.rowwise().sum();
   std::vector<double> levels;
   for (const Eigen::Vector3f& white : whites)

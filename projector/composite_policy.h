@@ -26,7 +26,7 @@ struct CompositePolicy {
   double passing = 0;
 
   /// Weight with which the screen also draws what light can show: 0 is `rest`, 1 is `full`.
-  double whole() const { return what == Composite::full ? 1 - passing : passing; }
+  double full_weight() const { return what == Composite::full ? 1 - passing : passing; }
 };
 
 /// The policies `seconds` later, given the coverage at that time. A new slot is decided by the middle of the

@@ -71,19 +71,20 @@ ContactShadow::ContactShadow(const scene::Scene& scene) {
     glTextureSubImage3D(*distances_, 0, k_nodes * (i % k_most_in_a_row), k_nodes * (i / k_most_in_a_row), 0,
                         k_nodes, k_nodes, k_nodes, GL_RED, GL_FLOAT,
                         all[static_cast<std::size_t>(i)].distances.data());
-  shown_.resize(slots_.size() + 1);
-  fields_ = make_buffer(shown_.data(), shown_.size() * sizeof(GpuField));
+  shown_fields_.resize(slots_.size() + 1);
+  fields_ = make_buffer(shown_fields_.data(), shown_fields_.size() * sizeof(GpuField));
 }
 
 void ContactShadow::place(const scene::PosedScene& posed) {
-  std::fill(shown_.begin(), shown_.end(), GpuField());
+  std::fill(shown_fields_.begin(), shown_fields_.end(), GpuField());
   for (const scene::PosedPart& part : posed.parts)
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].name != part.slot) continue;
       const auto field = slots_[i].variants.find(part.variant);
-      if (field != slots_[i].variants.end()) shown_[i + 1] = field->second;
+      if (field != slots_[i].variants.end()) shown_fields_[i + 1] = field->second;
     }
-  glNamedBufferSubData(*fields_, 0, static_cast<GLsizeiptr>(shown_.size() * sizeof(GpuField)), shown_.data());
+  glNamedBufferSubData(*fields_, 0, static_cast<GLsizeiptr>(shown_fields_.size() * sizeof(GpuField)),
+                       shown_fields_.data());
 }
 
 void ContactShadow::bind(const Use& use) const {

@@ -54,7 +54,7 @@ class ContactShadow final : public Bindable {
     std::map<std::string, GpuField> variants;
   };
   std::vector<SlotFields> slots_;
-  std::vector<GpuField> shown_;  // indexed by owner
+  std::vector<GpuField> shown_fields_;  // indexed by owner
   GlName distances_, fields_;
 };
 

@@ -9,16 +9,17 @@ namespace limn::projector {
 enum class Define {
   by_measurement,  ///< Light is compensated by the measured surface (Compensation::measured).
   contact_shadow,  ///< Parts cast contact shadows on the prototype.
-  known_shares,    ///< The image is a projector's: its blending shares are in the hit cache.
-  listed,          ///< The shader processes a pixel list instead of rectangles.
+  cached_shares,   ///< The image is a projector's: its blending shares are in the hit cache.
+  work_list,       ///< The shader processes a pixel list instead of rectangles.
   surface_maps,    ///< Materials have maps besides their colour, or emit light.
   surface_parts,   ///< Surface parts (lying on the prototype) may be visible.
   view_parts       ///< View parts (drawn for the viewer's position) may be visible.
 };
 
 /// Each Define as shaders spell it, in the order of the enumeration.
-inline constexpr std::array k_define_names = {"BY_MEASUREMENT", "CONTACT_SHADOW", "KNOWN_SHARES", "LISTED",
-                                              "SURFACE_MAPS",   "SURFACE_PARTS",  "VIEW_PARTS"};
+inline constexpr std::array k_define_names = {"BY_MEASUREMENT", "CONTACT_SHADOW", "CACHED_SHARES",
+                                              "WORK_LIST",      "SURFACE_MAPS",   "SURFACE_PARTS",
+                                              "VIEW_PARTS"};
 
 /// The names that a shader is compiled with.
 class Defines {

@@ -21,19 +21,19 @@ class EdgeFeathering {
   static Result<EdgeFeathering> create(int projectors, int width, int height);
 
   /// Finds the depth discontinuities of one projector; `depth` is the depth buffer of its triangle ids.
-  void find(int projector, const GlName& depth, const PinholeView& pinhole);
-  /// Computes the weights, after `find` has been called for all projectors. `seen` holds the scene and the
-  /// viewpoints.
-  void feather(const Resources& seen);
+  void find_edges(int projector, const GlName& depth, const PinholeView& pinhole);
+  /// Computes the weights, after `find_edges` has been called for all projectors. `scene_resources` holds the
+  /// scene and the viewpoints.
+  void feather(const Resources& scene_resources);
   /// The weights: one layer for each projector, one texel for each block; 0 at an edge, 1 away from edges.
-  const GlName& fade() const { return kept_; }
+  const GlName& fade() const { return weights_; }
 
  private:
-  ComputePass where_, find_, handed_, rows_, fade_;
-  GlName jumps_, marks_, along_rows_, kept_;
-  std::vector<cv::Size> blocks_;    // number of blocks in each projector's image
-  PixelList may_jump_;              // blocks that may contain a discontinuity
-  std::vector<PixelList> jumping_;  // blocks with a discontinuity, for each projector
+  ComputePass find_candidates_, find_edges_, mark_handover_, rows_, fade_;
+  GlName depth_edges_, marks_, along_rows_, weights_;
+  std::vector<cv::Size> blocks_;        // number of blocks in each projector's image
+  PixelList candidate_blocks_;          // blocks that may contain a discontinuity
+  std::vector<PixelList> edge_blocks_;  // blocks with a discontinuity, for each projector
 };
 
 }  // namespace limn::projector

@@ -19,8 +19,8 @@ constexpr int k_cluster = 128;  // triangles in a cluster
 
 // As in shaders/scene.glsl.
 struct GpuMaterial {
-  Eigen::Vector4f colour;  // a: 1 when unlit
-  Eigen::Vector4f look;    // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
+  Eigen::Vector4f colour;      // a: 1 when unlit
+  Eigen::Vector4f parameters;  // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
   Eigen::Vector4f emitted = {0, 0, 0, -1};
   Eigen::Vector4f maps = {-1, -1, 1, 1};
   Eigen::Vector4i more = Eigen::Vector4i::Zero();
@@ -166,7 +166,7 @@ struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> tangents;  // tangents at the corners, stored after the normals
   std::vector<GpuTriangle> triangles;
   std::vector<GpuMaterial> materials;
-  std::vector<scene::Texture> looks, maps;
+  std::vector<scene::Texture> colour_maps, maps;
 };
 
 std::size_t GpuScene::most_triangles() {
@@ -209,20 +209,20 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   normals_ = buffer_of(std::exchange(staging.normals, {}));
   triangles_ = buffer_of(std::exchange(staging.triangles, {}));
   materials_ = buffer_of(staging.materials);
-  owners_shown_.resize(static_cast<std::size_t>(owner_count()));
-  placements_ = buffer_of(owners_shown_);
+  gpu_owners_.resize(static_cast<std::size_t>(owner_count()));
+  placements_ = buffer_of(gpu_owners_);
   corner_texels_ = make_texels(corners_, GL_RGBA32F);
   normal_texels_ = make_texels(normals_, GL_RGBA32F);
   triangle_texels_ = make_texels(triangles_, GL_R32UI);
   placement_texels_ = make_texels(placements_, GL_RGBA32F);
-  looks_ = make_layers(staging.looks, GL_SRGB8_ALPHA8);
+  colour_maps_ = make_layers(staging.colour_maps, GL_SRGB8_ALPHA8);
   // 16 bits for 8-bit images: software GL interpolates texels with the precision of the format.
   maps_ = make_layers(staging.maps, GL_RGBA16);
-  const cv::Mat& mirrored = brdf_lut();
-  mirrored_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, mirrored.cols, mirrored.rows);
+  const cv::Mat& lut = brdf_lut();
+  brdf_lut_ = make_texture(GL_TEXTURE_2D, GL_RGBA32F, lut.cols, lut.rows);
   for (const GLenum filter : {GL_TEXTURE_MIN_FILTER, GL_TEXTURE_MAG_FILTER})
-    glTextureParameteri(*mirrored_, filter, GL_LINEAR);
-  upload(mirrored_, mirrored);
+    glTextureParameteri(*brdf_lut_, filter, GL_LINEAR);
+  upload(brdf_lut_, lut);
 
   vertex_array_ = make_vertex_array();
   glVertexArrayVertexBuffer(*vertex_array_, 0, *corners_, 0, sizeof(Eigen::Vector4f));
@@ -234,17 +234,17 @@ GpuScene::GpuScene(const scene::Scene& scene) {
 void GpuScene::add_material(const scene::Material& material, bool has_uvs, Staging* staging) {
   GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
   gpu.colour.w() = material.unlit ? 1 : 0;
-  gpu.look.tail<3>() << material.metallic, material.roughness, 0;
+  gpu.parameters.tail<3>() << material.metallic, material.roughness, 0;
   gpu.emitted.head<3>() = material.emitted;
   has_surface_maps_ |= !material.emitted.isZero();
   if (has_uvs && !material.texture.empty()) {
-    gpu.look.x() = layer_of({material.texture, material.texture_file}, &staging->looks);
-    if (material.texture.channels() == 4) gpu.look.w() = material.cut_below;
+    gpu.parameters.x() = layer_of({material.texture, material.texture_file}, &staging->colour_maps);
+    if (material.texture.channels() == 4) gpu.parameters.w() = material.cut_below;
   }
   const scene::SurfaceMaps& maps = material.maps;
   if (has_uvs && !maps.is_none()) {
     has_surface_maps_ = true;
-    if (!maps.emission.image.empty()) gpu.emitted.w() = layer_of(maps.emission, &staging->looks);
+    if (!maps.emission.image.empty()) gpu.emitted.w() = layer_of(maps.emission, &staging->colour_maps);
     if (!maps.metallic_roughness.image.empty() || !maps.occlusion.image.empty())
       gpu.maps.x() = layer_of(packed(maps), &staging->maps);
     if (!maps.normals.image.empty()) gpu.maps.y() = layer_of(maps.normals, &staging->maps);
@@ -274,7 +274,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   TriangleRun run;
   run.has_cut_outs = std::any_of(staging->materials.begin() + static_cast<std::ptrdiff_t>(first_material),
                                  staging->materials.end(),
-                                 [](const GpuMaterial& material) { return material.look.w() > 0; });
+                                 [](const GpuMaterial& material) { return material.parameters.w() > 0; });
   has_cut_outs_ |= run.has_cut_outs;
   run.first = static_cast<int>(staging->corners.size() / 3);
   run.count = static_cast<int>(mesh.triangles.size());
@@ -321,26 +321,26 @@ void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* ru
 }
 
 void GpuScene::place(const std::vector<PlacedRun>& runs) {
-  std::fill(owners_shown_.begin(), owners_shown_.end(), GpuOwner());
+  std::fill(gpu_owners_.begin(), gpu_owners_.end(), GpuOwner());
   for (const PlacedRun& placed : runs) {
-    GpuOwner& owner = owners_shown_[static_cast<std::size_t>(placed.owner)];
+    GpuOwner& owner = gpu_owners_[static_cast<std::size_t>(placed.owner)];
     owner.owner_from_scene = placed.scene_from_owner.inverse().matrix().cast<float>();
     owner.lower << placed.run->p_lower.cast<float>(), 1.f;
     owner.upper << placed.run->p_upper.cast<float>(), placed.on_surface ? 1.f : 0.f;
     if (placed.material.base_colour) owner.colour = placed.material.base_colour->cast<float>().homogeneous();
-    owner.look.x() = static_cast<float>(placed.material.metallic.value_or(-1));
-    owner.look.y() = static_cast<float>(placed.material.roughness.value_or(-1));
+    owner.metallic_roughness.x() = static_cast<float>(placed.material.metallic.value_or(-1));
+    owner.metallic_roughness.y() = static_cast<float>(placed.material.roughness.value_or(-1));
   }
-  glNamedBufferSubData(*placements_, 0, static_cast<GLsizeiptr>(owners_shown_.size() * sizeof(GpuOwner)),
-                       owners_shown_.data());
+  glNamedBufferSubData(*placements_, 0, static_cast<GLsizeiptr>(gpu_owners_.size() * sizeof(GpuOwner)),
+                       gpu_owners_.data());
 }
 
 void GpuScene::bind(const Use& use) const {
   const std::pair<int, const GlName*> textures[] = {
       {k_corners_unit, &corner_texels_},     {k_normals_unit, &normal_texels_},
       {k_triangles_unit, &triangle_texels_}, {k_placements_unit, &placement_texels_},
-      {k_colour_maps_unit, &looks_},         {k_surface_maps_unit, &maps_},
-      {k_brdf_lut_unit, &mirrored_}};
+      {k_colour_maps_unit, &colour_maps_},   {k_surface_maps_unit, &maps_},
+      {k_brdf_lut_unit, &brdf_lut_}};
   for (const auto& [unit, texture] : textures) glBindTextureUnit(static_cast<GLuint>(unit), **texture);
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_materials_buffer, *materials_);
   use.program.set("u_has_cut_outs", has_cut_outs_);

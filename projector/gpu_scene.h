@@ -61,7 +61,7 @@ class GpuScene final : public Bindable {
 
   bool has_cut_outs() const { return has_cut_outs_; }
   /// Defines that the shading programs need for the scene's materials.
-  Defines looks() const { return has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}; }
+  Defines shading_defines() const { return has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}; }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
 
@@ -77,7 +77,7 @@ class GpuScene final : public Bindable {
     Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when the part is shown
     Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
     Eigen::Vector4f colour = Eigen::Vector4f::Zero();
-    Eigen::Vector4f look = Eigen::Vector4f::Constant(-1);
+    Eigen::Vector4f metallic_roughness = Eigen::Vector4f::Constant(-1);
   };
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
   void add_material(const scene::Material& material, bool has_uvs, Staging* staging);
@@ -86,10 +86,10 @@ class GpuScene final : public Bindable {
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
   bool has_cut_outs_ = false, has_surface_maps_ = false;
-  std::vector<GpuOwner> owners_shown_;
+  std::vector<GpuOwner> gpu_owners_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
   GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers
-  GlName looks_, maps_, mirrored_;
+  GlName colour_maps_, maps_, brdf_lut_;
 };
 
 /// The corners of a mesh's bounds, with a margin, in the scene's frame.

@@ -11,13 +11,13 @@ namespace limn::projector {
 namespace {
 
 // The mask and shares of one part, counted in the output of coverage.frag.
-PartCoverage counted(const scene::PosedPart& part, const cv::Mat& seen, std::uint8_t owner) {
-  constexpr std::uint8_t k_projected = 2;  // as in shaders/seen.glsl
-  PartCoverage out{part.slot, part.variant, 0, 0, 0, cv::Mat::zeros(seen.size(), CV_8U)};
+PartCoverage counted(const scene::PosedPart& part, const cv::Mat& labels, std::uint8_t owner) {
+  constexpr std::uint8_t k_projected = 2;  // as in shaders/part_coverage.glsl
+  PartCoverage out{part.slot, part.variant, 0, 0, 0, cv::Mat::zeros(labels.size(), CV_8U)};
   int projected = 0;
-  for (int row = 0; row < seen.rows; ++row) {
-    for (int column = 0; column < seen.cols; ++column) {
-      const auto& pixel = seen.at<cv::Vec2b>(row, column);
+  for (int row = 0; row < labels.rows; ++row) {
+    for (int column = 0; column < labels.cols; ++column) {
+      const auto& pixel = labels.at<cv::Vec2b>(row, column);
       if (pixel[0] != owner) continue;
       const bool is_projected = pixel[1] == k_projected;
       out.mask.at<std::uint8_t>(row, column) = is_projected ? 255 : 128;
@@ -43,26 +43,29 @@ CompositeWeights::CompositeWeights(std::span<const CompositePolicy> policies,
   for (std::size_t owner = 1; owner <= slots.size() && owner < 4 * bytes_.size(); ++owner)
     for (const CompositePolicy& treatment : policies)
       if (treatment.slot == slots[owner - 1])
-        bytes_[owner / 4] |= static_cast<GLuint>(std::lround(255 * treatment.whole())) << owner % 4 * 8;
+        bytes_[owner / 4] |= static_cast<GLuint>(std::lround(255 * treatment.full_weight())) << owner % 4 * 8;
 }
 
-Result<ImagerView> ImagerView::create(const Shared& shared, const scene::Scene& scene_in, Defines looks) {
+Result<ImagerView> ImagerView::create(const Shared& shared,
+                                      const scene::Scene& scene_in,
+                                      Defines shading_defines) {
   using enum Resource;
   ImagerView view(shared);
   for (const scene::Slot& slot : scene_in.slots) view.slot_names_.push_back(slot.name);
-  LIMN_TRY(view.parts_layer_, PartsLayer::link(looks));
+  LIMN_TRY(view.parts_passes_, PartsPasses::link(shading_defines));
   LIMN_TRY(view.composite_pass_,
            FullscreenPass::link({.shader = "composite.frag", .reads = {light, camera_image}}));
   LIMN_TRY(view.coverage_pass_,
            FullscreenPass::link({.shader = "coverage.frag", .reads = {scene, viewpoints, lens}}));
-  LIMN_TRY(view.lit_pass_, FullscreenPass::link({.shader = "lit.frag",
-                                                 .reads = {scene, viewpoints, occlusion, lens, projector}}));
+  LIMN_TRY(view.illuminated_patches_pass_,
+           FullscreenPass::link({.shader = "illuminated_patches.frag",
+                                 .reads = {scene, viewpoints, occlusion, lens, projector}}));
   return view;
 }
 
 Status ImagerView::set_contact_shadow(const scene::Scene* scene) {
   const bool wanted = scene != nullptr;
-  if (wanted) LIMN_TRY_STATUS(parts_layer_.link_shadowed());
+  if (wanted) LIMN_TRY_STATUS(parts_passes_.link_shadowed());
   if (wanted && !contact_shadow_) contact_shadow_.emplace(*scene);
   if (has_contact_shadow_ != wanted)
     for (Overlay& overlay : overlays_) overlay.posed.reset();
@@ -70,9 +73,9 @@ Status ImagerView::set_contact_shadow(const scene::Scene* scene) {
   return {};
 }
 
-bool ImagerView::Overlay::shows(const Imager& imager_now,
-                                const scene::PosedScene& posed_now,
-                                const CompositeWeights& weights_now) const {
+bool ImagerView::Overlay::is_valid_for(const Imager& imager_now,
+                                       const scene::PosedScene& posed_now,
+                                       const CompositeWeights& weights_now) const {
   return posed && weights == weights_now && is_same(*posed, posed_now) &&
          is_same(imager.imager_from_world, imager_now.imager_from_world);
 }
@@ -112,9 +115,9 @@ void ImagerView::draw_parts(const Imager& imager, const scene::PosedScene& posed
     contact_shadow_->place(posed);
     resources = resources.with(Resource::contact_shadow, *contact_shadow_);
   }
-  parts_layer_.draw({.is_view = is_view, .is_shadowed = has_contact_shadow_},
-                    {overlay->parts.texture, {imager.width, imager.height}}, overlay->places, smoothing_,
-                    resources, &shared_.times);
+  parts_passes_.draw({.is_view = is_view, .is_shadowed = has_contact_shadow_},
+                     {overlay->parts.texture, {imager.width, imager.height}}, overlay->places, smoothing_,
+                     resources, &shared_.times);
   overlay->posed = posed;
   overlay->imager = imager;
 }
@@ -126,7 +129,7 @@ cv::Mat ImagerView::lay_over(const cv::Mat& bgr,
                              const scene::PosedScene& posed,
                              const CompositeWeights& weights,
                              Overlay* overlay) {
-  if (!overlay->shows(imager, posed, weights)) {
+  if (!overlay->is_valid_for(imager, posed, weights)) {
     overlay->weights = weights;
     draw_parts(imager, posed, overlay);
   }
@@ -168,12 +171,12 @@ std::vector<PartCoverage> ImagerView::coverage(const scene::PosedScene& posed, c
       canvas,
       scene.visibility().visible_rects(viewer, lens.baked, scene.runs(), scene.scene_from_world(), false, 0),
       scene.resources(lens));
-  const cv::Mat seen = read_back(canvas.framebuffer, viewer.width, viewer.height, CV_8UC2, GL_RG);
+  const cv::Mat labels = read_back(canvas.framebuffer, viewer.width, viewer.height, CV_8UC2, GL_RG);
   std::vector<PartCoverage> out;
   for (const scene::PosedPart& part : posed.parts) {
     const auto slot = std::find(slot_names_.begin(), slot_names_.end(), part.slot);
     const auto owner = static_cast<std::uint8_t>(slot - slot_names_.begin() + 1);
-    out.push_back(counted(part, seen, owner));
+    out.push_back(counted(part, labels, owner));
   }
   return out;
 }
@@ -187,10 +190,10 @@ IlluminatedPatches ImagerView::illuminated_patches(const Imager& imager,
   const Canvas& canvas = shared_.canvases.canvas(std::max(1, imager.width / side_px),
                                                  std::max(1, imager.height / side_px), GL_RGBA32F);
   const Resources resources = scene.resources(scene.lens_of(imager));
-  lit_pass_.program().set("u_side", static_cast<float>(side_px));
+  illuminated_patches_pass_.program().set("u_side", static_cast<float>(side_px));
   const auto drawn = [&](int index) {
     const ProjectorIndex projector(index);
-    lit_pass_.draw(canvas, resources.with(Resource::projector, projector));
+    illuminated_patches_pass_.draw(canvas, resources.with(Resource::projector, projector));
     return read_back(canvas.framebuffer, canvas.width, canvas.height, CV_32FC4, GL_RGBA);
   };
   IlluminatedPatches patches{side_px, scene.scene_from_world(), drawn(-1), {}};

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "projector/contact_shadow.h"
-#include "projector/parts_layer.h"
+#include "projector/parts_passes.h"
 #include "projector/projector_view.h"
 #include "projector/renderer.h"
 
@@ -23,7 +23,7 @@ class CompositeWeights final : public Bindable {
   /// A slot without a policy gets 0. `slots`: the slot names in the order of owners, from owner 1 on.
   CompositeWeights(std::span<const CompositePolicy> policies, std::span<const std::string> slots);
   /// Binds Resource::composite_weights.
-  void bind(const Use& use) const override { use.program.set_bits("u_whole", bytes_); }
+  void bind(const Use& use) const override { use.program.set_bits("u_composite_weights", bytes_); }
   bool operator==(const CompositeWeights& other) const { return bytes_ == other.bytes_; }
 
  private:
@@ -33,8 +33,8 @@ class CompositeWeights final : public Bindable {
 /// Draws the parts as cameras, viewers and virtual cameras see them.
 class ImagerView {
  public:
-  /// `looks`: the defines of the shading programs (GpuScene::looks).
-  static Result<ImagerView> create(const Shared& shared, const scene::Scene& scene, Defines looks);
+  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines).
+  static Result<ImagerView> create(const Shared& shared, const scene::Scene& scene, Defines shading_defines);
 
   /// As Renderer::set_smoothing and set_contact_shadow.
   void set_smoothing(const Smoothing& smoothing) { smoothing_ = smoothing; }
@@ -67,9 +67,9 @@ class ImagerView {
     GlName behind;  // The background image.
     Canvas out;
 
-    bool shows(const Imager& imager_now,
-               const scene::PosedScene& posed_now,
-               const CompositeWeights& weights_now) const;
+    bool is_valid_for(const Imager& imager_now,
+                      const scene::PosedScene& posed_now,
+                      const CompositeWeights& weights_now) const;
   };
   explicit ImagerView(const Shared& shared) : shared_(shared) {}
   Overlay& overlay_of(const Imager& imager, bool is_view, Kind kind);
@@ -82,8 +82,8 @@ class ImagerView {
 
   Shared shared_;
   std::vector<std::string> slot_names_;
-  PartsLayer parts_layer_;
-  FullscreenPass composite_pass_, coverage_pass_, lit_pass_;
+  PartsPasses parts_passes_;
+  FullscreenPass composite_pass_, coverage_pass_, illuminated_patches_pass_;
   std::optional<ContactShadow> contact_shadow_;
   bool has_contact_shadow_ = false;
   Smoothing smoothing_;

@@ -52,11 +52,11 @@ Status LightBalance::measure(const MeasuredSurface& measured,
   scene->prepare(bare, SceneCache::FromProjectors::prototype);
   scene->draw_from_imager(camera);
   const Canvas& canvas = canvases->canvas(camera.width, camera.height, GL_R32F);
-  const Resources seen = scene->resources(scene->lens_of(camera));
+  const Resources resources = scene->resources(scene->lens_of(camera));
   std::vector<cv::Mat> irradiances;
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const ProjectorIndex projector(i);
-    irradiance_.draw(canvas, seen.with(Resource::projector, projector));
+    irradiance_.draw(canvas, resources.with(Resource::projector, projector));
     irradiances.push_back(read_back(canvas.framebuffer, camera.width, camera.height, CV_32FC1, GL_RED));
   }
   LIMN_TRY(SurfaceMixing found, surface_mixing(measured, irradiances));

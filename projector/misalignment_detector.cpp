@@ -80,8 +80,8 @@ MisalignmentDetector::MisalignmentDetector(const Rig& rig, std::size_t camera)
   for (const Imager& projector : rig.projectors)
     lights_.push_back({light_of_display(rig, projector.name), {}});
   for (std::size_t i = 0; i <= lights_.size(); ++i) {
-    look_.push_back(nothing());
-    all_.push_back(nothing());
+    current_.push_back(empty_sum());
+    total_.push_back(empty_sum());
   }
 }
 
@@ -98,12 +98,12 @@ void MisalignmentDetector::place(IlluminatedPatches patches) {
 }
 
 // The predicted light of a projector in the camera's image.
-cv::Mat MisalignmentDetector::given(std::size_t projector, const cv::Mat& image) const {
-  const cv::Mat& lit = patches_.by_projector[projector];
-  if (image.empty()) return cv::Mat::zeros(lit.size(), CV_32F);
+cv::Mat MisalignmentDetector::predicted_light(std::size_t projector, const cv::Mat& image) const {
+  const cv::Mat& patch_light = patches_.by_projector[projector];
+  if (image.empty()) return cv::Mat::zeros(patch_light.size(), CV_32F);
   cv::Mat light, channels[4], out;
   cv::LUT(image, lights_[projector].table, light);
-  cv::split(lit, channels);
+  cv::split(patch_light, channels);
   cv::remap(luminance(light), out, channels[0], channels[1], cv::INTER_LINEAR);
   return out.mul(channels[2]);
 }
@@ -124,9 +124,9 @@ void MisalignmentDetector::begin(const Frame& frame,
   cv::resize(light(whole), frame_, size, 0, 0, cv::INTER_AREA);
   cv::Mat is(size, CV_32F, cv::Scalar(0));
   for (std::size_t i = 0; i < lights_.size(); ++i) {
-    lights_[i].given = given(i, shown[i]);
-    is += lights_[i].given;
-    was += given(i, before[i]);
+    lights_[i].predicted = predicted_light(i, shown[i]);
+    is += lights_[i].predicted;
+    was += predicted_light(i, before[i]);
     cv::Mat irradiance;
     cv::extractChannel(patches_.by_projector[i], irradiance, 2);
     reached += irradiance;
@@ -151,11 +151,11 @@ void MisalignmentDetector::begin(const Frame& frame,
   std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
   if (found.size() > k_most_cells) found.erase(found.begin(), found.end() - k_most_cells);
   for (const auto& [contrast, cell] : found) cells_.push_back(cell);
-  for (Sum& sum : look_) sum = nothing();
-  const double passed_s = looked_at_ == Stamp{} ? 0 : seconds_between(looked_at_, frame.captured_at);
+  for (Sum& sum : current_) sum = empty_sum();
+  const double passed_s = compared_at_ == Stamp{} ? 0 : seconds_between(compared_at_, frame.captured_at);
   const double kept = std::exp(-std::max(0.0, passed_s) / k_memory_s);
-  for (Sum& sum : all_) sum = {sum.map * kept, sum.gains * kept, sum.contrast * kept};
-  looked_at_ = frame.captured_at;
+  for (Sum& sum : total_) sum = {sum.map * kept, sum.gains * kept, sum.contrast * kept};
+  compared_at_ = frame.captured_at;
 }
 
 bool MisalignmentDetector::compare(int cells) {
@@ -165,10 +165,10 @@ bool MisalignmentDetector::compare(int cells) {
     cells_.pop_back();
   }
   if (!cells_.empty()) return false;
-  for (std::size_t i = 0; i < all_.size(); ++i) {
-    all_[i].map += look_[i].map;
-    all_[i].gains += look_[i].gains;
-    all_[i].contrast += look_[i].contrast;
+  for (std::size_t i = 0; i < total_.size(); ++i) {
+    total_[i].map += current_[i].map;
+    total_[i].gains += current_[i].gains;
+    total_[i].contrast += current_[i].contrast;
   }
   return true;
 }
@@ -182,7 +182,7 @@ void MisalignmentDetector::compare_cell(const cv::Rect& cell) {
   const auto centred = [](const cv::Mat& m) -> cv::Mat { return m - cv::mean(m)[0]; };
   const cv::Mat f = centred(frame_(cell));
   cv::Mat all = cv::Mat::zeros(around.size(), CV_32F);
-  for (const Light& light : lights_) all += light.given(around);
+  for (const Light& light : lights_) all += light.predicted(around);
   const cv::Rect inner(k_reach, k_reach, k_cell, k_cell);
   const double contrast = stddev(all(inner)), f_norm = cv::norm(f);
   const auto add = [&](const cv::Mat& a, const cv::Mat& b, double share, Sum* sum) {
@@ -198,27 +198,27 @@ void MisalignmentDetector::compare_cell(const cv::Rect& cell) {
     const double least = std::pow(0.1 * contrast, 2) * area;
     cv::Mat norm;
     cv::sqrt(cv::max(variance, least), norm);
-    const cv::Mat likeness = covariance / norm / f_norm;
-    sum->map += weight * likeness;
-    sum->gains += contrast / white_ * (likeness - likeness.at<float>(k_reach, k_reach));
+    const cv::Mat correlation = covariance / norm / f_norm;
+    sum->map += weight * correlation;
+    sum->gains += contrast / white_ * (correlation - correlation.at<float>(k_reach, k_reach));
   };
   for (std::size_t i = 0; i < lights_.size(); ++i) {
-    const cv::Mat& own = lights_[i].given;
+    const cv::Mat& own = lights_[i].predicted;
     const cv::Mat others = all(inner) - own(cell);
     const double own_contrast = stddev(own(cell)), share = own_contrast / (own_contrast + stddev(others));
-    if (share > k_least_share) add(own(around), others, share, &look_[i]);
+    if (share > k_least_share) add(own(around), others, share, &current_[i]);
   }
-  add(all, cv::Mat::zeros(cell.size(), CV_32F), 1, &look_.back());
+  add(all, cv::Mat::zeros(cell.size(), CV_32F), 1, &current_.back());
 }
 
-MisalignmentDetector::Sum MisalignmentDetector::nothing() {
+MisalignmentDetector::Sum MisalignmentDetector::empty_sum() {
   const cv::Size shifts(2 * k_reach + 1, 2 * k_reach + 1);
   return {cv::Mat(shifts, CV_32F, cv::Scalar(0)), cv::Mat(shifts, CV_32F, cv::Scalar(0)), 0};
 }
 
-LightDisplacements MisalignmentDetector::places() const {
+LightDisplacements MisalignmentDetector::displacements() const {
   LightDisplacements out;
-  for (const Sum& sum : all_) out.projectors.push_back(best(sum.map, sum.gains, sum.contrast, side_px_));
+  for (const Sum& sum : total_) out.projectors.push_back(best(sum.map, sum.gains, sum.contrast, side_px_));
   out.all = out.projectors.back();
   out.projectors.pop_back();
   out.mm_per_px = mm_per_px_;

@@ -15,8 +15,9 @@ namespace limn::projector {
 /// The shift between the light seen in a camera's images and the light predicted from the rig.
 struct Displacement {
   Eigen::Vector2d px = Eigen::Vector2d::Zero();  ///< Found minus predicted, camera pixels.
-  double likeness = 0;     ///< Correlation of the frames with the light shifted by `px`, up to 1.
-  double as_foretold = 0;  ///< Correlation of the frames with the light as predicted, without a shift.
+  double correlation = 0;  ///< Correlation of the frames with the light shifted by `px`, up to 1.
+  /// Correlation of the frames with the light as predicted, without a shift.
+  double unshifted_correlation = 0;
   /// Weight of the evidence: the sum over the cells of the last seconds of the standard deviation of their
   /// light, as a share of white. Each cell is weighted by the share of the light in question in its contrast.
   /// 0: no light with edges was shown.
@@ -51,7 +52,7 @@ class MisalignmentDetector {
   /// Sets where the light falls from now on. The sums so far are kept.
   void place(IlluminatedPatches patches);
 
-  bool is_looking() const { return !cells_.empty(); }
+  bool is_comparing() const { return !cells_.empty(); }
   /// Begins the comparison with a frame (8-bit grey or BGR of the camera's size). `shown` and `before` are
   /// the images that each projector showed during the exposure and shortly before it (8-bit BGR; empty:
   /// black). `avoid`: quadrilaterals of the frame that are left out (markers, because paper has edges of its
@@ -63,14 +64,14 @@ class MisalignmentDetector {
   /// Compares some cells; returns true when the frame is finished.
   bool compare(int cells);
 
-  LightDisplacements places() const;
+  LightDisplacements displacements() const;
 
  private:
   struct Light {
-    cv::Mat table;  // CV_32FC3, 1 x 256: light of each display value
-    cv::Mat given;  // CV_32F: predicted light of this projector in the camera's image
+    cv::Mat table;      // CV_32FC3, 1 x 256: light of each display value
+    cv::Mat predicted;  // CV_32F: predicted light of this projector in the camera's image
   };
-  cv::Mat given(std::size_t projector, const cv::Mat& image) const;
+  cv::Mat predicted_light(std::size_t projector, const cv::Mat& image) const;
   void compare_cell(const cv::Rect& cell);
 
   Imager imager_;
@@ -83,15 +84,15 @@ class MisalignmentDetector {
   std::vector<Light> lights_;    // one for each projector
   std::vector<cv::Rect> cells_;  // still to be compared, the best last
   double white_ = 0;             // mean irradiance of white on the usable pixels
-  Stamp looked_at_;
+  Stamp compared_at_;
   // Sums over cells: one for each projector, and the last one for all light.
   struct Sum {
     cv::Mat map;          // CV_32F, a pixel for each shift: contrast x share x correlation
     cv::Mat gains;        // CV_32F, likewise: contrast x gain in correlation
     double contrast = 0;  // sum of the weights contrast x share
   };
-  static Sum nothing();
-  std::vector<Sum> look_, all_;  // of the current frame; of all frames, with forgetting
+  static Sum empty_sum();
+  std::vector<Sum> current_, total_;  // of the current frame; of all frames, with forgetting
 };
 
 }  // namespace limn::projector

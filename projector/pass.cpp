@@ -31,7 +31,7 @@ Result<ComputePass> ComputePass::link(const Description& description) {
   return ComputePass(std::move(program), description);
 }
 
-void ComputePass::look_through(std::span<const cv::Rect> places, const Resources& resources) const {
+void ComputePass::run_over_rects(std::span<const cv::Rect> places, const Resources& resources) const {
   use(resources);
   for (const cv::Rect& place : places) {
     program().set("u_first", place.x, place.y);
@@ -42,14 +42,14 @@ void ComputePass::look_through(std::span<const cv::Rect> places, const Resources
   glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
-void ComputePass::work_through(const PixelList& pixels, const Resources& resources) const {
+void ComputePass::run_over_list(const PixelList& pixels, const Resources& resources) const {
   use(resources);
   pixels.dispatch();
   glMemoryBarrier(GL_ALL_BARRIER_BITS);
 }
 
 Result<FullscreenPass> FullscreenPass::link(const Description& description) {
-  LIMN_TRY(Program program, Program::link("whole.vert", description.shader));
+  LIMN_TRY(Program program, Program::link("fullscreen.vert", description.shader));
   return FullscreenPass(std::move(program), description);
 }
 

@@ -49,9 +49,9 @@ class ComputePass : public Pass {
 
   /// Runs over rectangles in work groups of 16 x 4 pixels. The shader gets each rectangle as u_first and
   /// u_end.
-  void look_through(std::span<const cv::Rect> places, const Resources& resources) const;
-  /// Runs over a pixel list, 64 pixels in each work group (shaders/listed.glsl).
-  void work_through(const PixelList& pixels, const Resources& resources) const;
+  void run_over_rects(std::span<const cv::Rect> places, const Resources& resources) const;
+  /// Runs over a pixel list, 64 pixels in each work group (shaders/work_list.glsl).
+  void run_over_list(const PixelList& pixels, const Resources& resources) const;
 
  private:
   using Pass::Pass;
@@ -70,7 +70,7 @@ class FullscreenPass : public Pass {
  private:
   FullscreenPass(Program program, const Description& description)
       : Pass(std::move(program), description), vertex_array_(make_vertex_array()) {}
-  GlName vertex_array_;  // without attributes, for whole.vert
+  GlName vertex_array_;  // without attributes, for fullscreen.vert
 };
 
 }  // namespace limn::projector

@@ -21,7 +21,7 @@ PassTimes::Scope::~Scope() {
   if (times_) glQueryCounter(times_->queries_.back().to, GL_TIMESTAMP);
 }
 
-std::vector<PassTime> PassTimes::taken() {
+std::vector<PassTime> PassTimes::take_times() {
   std::vector<PassTime> times;
   for (const Query& query : queries_) {
     GLuint64 from = 0, to = 0;

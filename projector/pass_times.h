@@ -36,7 +36,7 @@ class PassTimes {
   };
 
   /// Times of all passes since the last call, in their order. Waits for the GPU.
-  std::vector<PassTime> taken();
+  std::vector<PassTime> take_times();
 
  private:
   struct Query {

@@ -33,24 +33,25 @@ ProjectorView::HitCache::HitCache(int width, int height)
 void ProjectorView::HitCache::bind(const Use& use) const {
   glBindImageTexture(k_cached_hits_image, *hits_, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32UI);
   glBindImageTexture(k_cached_shares_image, *shares_, 0, GL_FALSE, 0, GL_READ_WRITE, GL_RGBA32F);
-  use.program.set_id("u_known_stamp", stamp_);
+  use.program.set_id("u_cache_stamp", stamp_);
 }
 
-bool ProjectorView::Shown::shows(const scene::PosedScene& posed_now, const Imager& viewer) const {
+bool ProjectorView::CachedImage::is_valid_for(const scene::PosedScene& posed_now,
+                                              const Imager& viewer) const {
   return is_current && is_same(posed, posed_now) && is_same(imager_from_world, viewer.imager_from_world);
 }
 
-void ProjectorView::Shown::keep(const scene::PosedScene& posed_now, const Imager& viewer) {
+void ProjectorView::CachedImage::mark_valid_for(const scene::PosedScene& posed_now, const Imager& viewer) {
   posed = posed_now;
   imager_from_world = viewer.imager_from_world;
   image.release();
   is_current = true;
 }
 
-Result<ProjectorView> ProjectorView::create(const Shared& shared, Defines looks) {
+Result<ProjectorView> ProjectorView::create(const Shared& shared, Defines shading_defines) {
   using enum Resource;
   ProjectorView view(shared);
-  LIMN_TRY(view.light_layer_, LightLayer::link(looks, false));
+  LIMN_TRY(view.light_passes_, LightPasses::link(shading_defines, false));
   LIMN_TRY(view.response_pass_, ComputePass::link({.shader = "light_response.comp",
                                                    .reads = {viewpoints, projector, light, response},
                                                    .writes = {target}}));
@@ -68,14 +69,14 @@ Result<ProjectorView> ProjectorView::create(const Shared& shared, Defines looks)
 }
 
 Status ProjectorView::link_measured() {
-  if (measured_light_layer_) return {};
-  const Defines looks = shared_.scene.scene().looks();
-  LIMN_TRY(measured_light_layer_, LightLayer::link(looks, true));
+  if (measured_light_passes_) return {};
+  const Defines shading_defines = shared_.scene.scene().shading_defines();
+  LIMN_TRY(measured_light_passes_, LightPasses::link(shading_defines, true));
   return {};
 }
 
-void ProjectorView::forget() {
-  for (Shown& shown : shown_) shown.is_current = false;
+void ProjectorView::invalidate() {
+  for (CachedImage& cached : cached_images_) cached.is_current = false;
 }
 
 // Whether to use half the samples. Only for images in motion; a still image is then drawn once more with all
@@ -89,9 +90,9 @@ const Smoothing& ProjectorView::smoothing(bool is_quick) const {
   return is_quick ? k_quick_edges : k_light_edges;
 }
 
-LightLayer& ProjectorView::layer() {
+LightPasses& ProjectorView::light_passes() {
   const bool by_measurement = shared_.balance.options().compensation == Compensation::measured;
-  return by_measurement ? *measured_light_layer_ : light_layer_;
+  return by_measurement ? *measured_light_passes_ : light_passes_;
 }
 
 // Finds where there may be light: at the parts, or on the whole prototype with even black.
@@ -105,79 +106,79 @@ void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
   }
   const Eigen::Vector3d p_viewer_scene =
       (scene.scene_from_world() * viewer.imager_from_world.inverse()).translation;
-  scene.visibility().lit_rects(index, scene.runs(), scene.scene_from_world(), p_viewer_scene, &view_places_,
-                               &surface_places_);
+  scene.visibility().light_rects(index, scene.runs(), scene.scene_from_world(), p_viewer_scene, &view_places_,
+                                 &surface_places_);
   light_places_.divide(view_places_, surface_places_);
 }
 
 GLuint ProjectorView::draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
-  LIMN_CHECK(index < shown_.size());
-  Shown& shown = shown_[index];
-  const bool is_still = shown.shows(posed, viewer);
-  if (is_still && !shown.is_quick) return *shown.display.texture;
-  shown.is_quick = is_quick(is_still);
+  LIMN_CHECK(index < cached_images_.size());
+  CachedImage& cached = cached_images_[index];
+  const bool is_still = cached.is_valid_for(posed, viewer);
+  if (is_still && !cached.is_quick) return *cached.display.texture;
+  cached.is_quick = is_quick(is_still);
 
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::all);
-  scene.draw_from_eye(viewer);
+  scene.draw_from_viewer(viewer);
   shared_.balance.find_level(shared_.rig, posed);
   find_places(index, viewer);
 
   const Imager& imager = shared_.rig.projectors[index];
-  if (!shown.display.texture) {
-    shown.display = Canvas(imager.width, imager.height, GL_RGBA8);
-    shown.hit_cache = HitCache(imager.width, imager.height);
+  if (!cached.display.texture) {
+    cached.display = Canvas(imager.width, imager.height, GL_RGBA8);
+    cached.hit_cache = HitCache(imager.width, imager.height);
   }
   const Canvas& light = shared_.canvases.canvas(imager.width, imager.height, GL_RGBA32F);
   const ProjectorIndex projector(index);
   const Resources resources = scene.resources(scene.projector_lens(index), viewer)
                                   .with(Resource::projector, projector)
-                                  .with(Resource::hit_cache, shown.hit_cache)
+                                  .with(Resource::hit_cache, cached.hit_cache)
                                   .with(Resource::light_balance, shared_.balance);
   draw_light(index, light, resources);
   draw_display(index, light, resources);
-  shown.keep(posed, viewer);
-  return *shown.display.texture;
+  cached.mark_valid_for(posed, viewer);
+  return *cached.display.texture;
 }
 
 void ProjectorView::draw_light(std::size_t index, const Canvas& light, const Resources& resources) {
-  Shown& shown = shown_[index];
+  CachedImage& cached = cached_images_[index];
   const GLuint stamp = shared_.scene.stamp();
-  shown.hit_cache.begin(stamp);
-  layer().draw({light.texture, {light.width, light.height}, shown.hit_cache.is_outdated(stamp)},
-               light_places_, smoothing(shown.is_quick), resources, &shared_.times);
-  shown.hit_cache.end();
+  cached.hit_cache.begin(stamp);
+  light_passes().draw({light.texture, {light.width, light.height}, cached.hit_cache.is_outdated(stamp)},
+                      light_places_, smoothing(cached.is_quick), resources, &shared_.times);
+  cached.hit_cache.end();
 }
 
 // Converts the light to display values.
 void ProjectorView::draw_display(std::size_t index, const Canvas& light, const Resources& resources) {
   const PassTimes::Scope scope(&shared_.times, "response");
   const LightOptions& options = shared_.balance.options();
-  const GlName& display = shown_[index].display.texture;
+  const GlName& display = cached_images_[index].display.texture;
   const TextureAt linear(k_light_unit, light.texture), response(k_response_unit, responses_[index]);
   const ImageAt drawn(k_target_image, display, GL_RGBA8);
   response_pass_.program().set("u_is_balanced",
                                options.compensation != Compensation::none || options.even_black);
   glClearTexImage(*display, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
-  layer().work_through_lit(response_pass_, resources.with(Resource::light, linear)
-                                               .with(Resource::response, response)
-                                               .with(Resource::target, drawn));
+  light_passes().run_over_drawn_pixels(response_pass_, resources.with(Resource::light, linear)
+                                                           .with(Resource::response, response)
+                                                           .with(Resource::target, drawn));
 }
 
 cv::Mat ProjectorView::image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   draw(index, posed, viewer);
-  Shown& shown = shown_[index];
-  if (shown.image.empty()) {
-    const Canvas& display = shown.display;
+  CachedImage& cached = cached_images_[index];
+  if (cached.image.empty()) {
+    const Canvas& display = cached.display;
     const cv::Mat bgra = read_back(display.framebuffer, display.width, display.height, CV_8UC4, GL_BGRA);
-    cv::cvtColor(bgra, shown.image, cv::COLOR_BGRA2BGR);
-    cv::extractChannel(bgra, shown.clipped, 3);
+    cv::cvtColor(bgra, cached.image, cv::COLOR_BGRA2BGR);
+    cv::extractChannel(bgra, cached.clipped, 3);
   }
-  return shown.image.clone();
+  return cached.image.clone();
 }
 
 cv::Mat ProjectorView::surface_points(std::size_t index, const scene::PosedScene& posed) {
-  LIMN_CHECK(index < shown_.size());
+  LIMN_CHECK(index < cached_images_.size());
   const Imager& imager = shared_.rig.projectors[index];
   shared_.scene.prepare(posed, SceneCache::FromProjectors::prototype);
   const Canvas& canvas = shared_.canvases.canvas(imager.width, imager.height, GL_RGBA32F);
@@ -197,7 +198,7 @@ cv::Mat ProjectorView::surface_points(std::size_t index, const scene::PosedScene
 }
 
 cv::Mat ProjectorView::blend(std::size_t index, const scene::PosedScene& posed) {
-  LIMN_CHECK(index < shown_.size());
+  LIMN_CHECK(index < cached_images_.size());
   const Imager& imager = shared_.rig.projectors[index];
   shared_.scene.prepare(posed, SceneCache::FromProjectors::all);
   const Canvas& canvas = shared_.canvases.canvas(imager.width, imager.height, GL_RG32F);

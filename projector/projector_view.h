@@ -6,7 +6,7 @@
 
 #include "core/rig.h"
 #include "projector/light_balance.h"
-#include "projector/light_layer.h"
+#include "projector/light_passes.h"
 #include "projector/scene_cache.h"
 
 namespace limn::projector {
@@ -23,8 +23,8 @@ struct Shared {
 /// Draws the projectors' images, and data about their pixels.
 class ProjectorView {
  public:
-  /// `looks`: the defines of the shading programs (GpuScene::looks).
-  static Result<ProjectorView> create(const Shared& shared, Defines looks);
+  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines).
+  static Result<ProjectorView> create(const Shared& shared, Defines shading_defines);
 
   /// Links the programs for Compensation::measured. Must be called before drawing with it; further calls do
   /// nothing.
@@ -32,17 +32,17 @@ class ProjectorView {
   /// As Renderer::set_quick_motion.
   void set_quick_motion(bool wanted) { quick_motion_ = wanted; }
   /// Marks all images as outdated, so that they are drawn again.
-  void forget();
+  void invalidate();
 
   /// As Renderer::draw_projector, projector_image, clipped, surface_points and blend.
   GLuint draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
   cv::Mat image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
-  cv::Mat clipped(std::size_t index) const { return shown_.at(index).clipped; }
+  cv::Mat clipped(std::size_t index) const { return cached_images_.at(index).clipped; }
   cv::Mat surface_points(std::size_t index, const scene::PosedScene& posed);
   cv::Mat blend(std::size_t index, const scene::PosedScene& posed);
 
  private:
-  // What the centres of a projector's pixels see, and their blending shares (shaders/known.glsl).
+  // What the centres of a projector's pixels see, and their blending shares (shaders/hit_cache.glsl).
   class HitCache final : public Bindable {
    public:
     HitCache() = default;
@@ -59,7 +59,7 @@ class ProjectorView {
     GLuint stamp_ = 0, filled_at_ = 0;
   };
   // A projector's last image.
-  struct Shown {
+  struct CachedImage {
     Canvas display;
     HitCache hit_cache;
     scene::PosedScene posed;
@@ -68,25 +68,26 @@ class ProjectorView {
     bool is_current = false;
     bool is_quick = false;
 
-    bool shows(const scene::PosedScene& posed_now, const Imager& viewer) const;
-    void keep(const scene::PosedScene& posed_now, const Imager& viewer);
+    bool is_valid_for(const scene::PosedScene& posed_now, const Imager& viewer) const;
+    void mark_valid_for(const scene::PosedScene& posed_now, const Imager& viewer);
   };
 
-  explicit ProjectorView(const Shared& shared) : shared_(shared), shown_(shared.rig.projectors.size()) {}
+  explicit ProjectorView(const Shared& shared)
+      : shared_(shared), cached_images_(shared.rig.projectors.size()) {}
   bool is_quick(bool is_still) const;
   const Smoothing& smoothing(bool is_quick) const;
-  LightLayer& layer();
+  LightPasses& light_passes();
   void find_places(std::size_t index, const Imager& viewer);
   void draw_light(std::size_t index, const Canvas& light, const Resources& resources);
   void draw_display(std::size_t index, const Canvas& light, const Resources& resources);
 
   Shared shared_;
-  LightLayer light_layer_;
-  std::optional<LightLayer> measured_light_layer_;  // linked on demand
+  LightPasses light_passes_;
+  std::optional<LightPasses> measured_light_passes_;  // linked on demand
   ComputePass response_pass_;
   FullscreenPass points_pass_, blend_pass_;
   std::vector<GlName> responses_;
-  std::vector<Shown> shown_;
+  std::vector<CachedImage> cached_images_;
   bool quick_motion_ = false;
   PlacesByMode light_places_;  // places of the projector drawn last
   std::vector<cv::Rect> view_places_, surface_places_;

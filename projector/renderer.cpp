@@ -52,9 +52,9 @@ Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY(LightBalance balance, LightBalance::create(scene));
   auto base = std::make_unique<Impl::Base>(
       Impl::Base{rig, std::move(times), std::move(cache), std::move(balance), {}});
-  const Defines looks = base->scene.scene().looks();
-  LIMN_TRY(ProjectorView projectors, ProjectorView::create(base->shared(), looks));
-  LIMN_TRY(ImagerView imagers, ImagerView::create(base->shared(), scene, looks));
+  const Defines shading_defines = base->scene.scene().shading_defines();
+  LIMN_TRY(ProjectorView projectors, ProjectorView::create(base->shared(), shading_defines));
+  LIMN_TRY(ImagerView imagers, ImagerView::create(base->shared(), scene, shading_defines));
   return Renderer(std::make_unique<Impl>(Impl{std::move(base), std::move(projectors), std::move(imagers)}));
 }
 
@@ -67,13 +67,13 @@ Status Renderer::set_light(const LightOptions& options, const MeasuredSurface* s
     LIMN_TRY_STATUS(impl_->projectors.link_measured());
     LIMN_TRY_STATUS(base.balance.measure(*surface, base.rig, &base.scene, &base.canvases));
   }
-  if (base.balance.set_options(options) || by_measurement) impl_->projectors.forget();
+  if (base.balance.set_options(options) || by_measurement) impl_->projectors.invalidate();
   return {};
 }
 
 void Renderer::set_occlusion(std::size_t index, const cv::Mat& map) {
   LIMN_CHECK(index < impl_->base->rig.projectors.size());
-  if (impl_->base->scene.occlusion().set(index, map)) impl_->projectors.forget();
+  if (impl_->base->scene.occlusion().set(index, map)) impl_->projectors.invalidate();
 }
 
 void Renderer::set_smoothing(const Smoothing& smoothing) {
@@ -91,7 +91,7 @@ cv::Mat Renderer::clipped(std::size_t index) const { return impl_->projectors.cl
 
 void Renderer::time_passes(bool wanted) { impl_->base->times->enable(wanted); }
 
-std::vector<PassTime> Renderer::pass_times() { return impl_->base->times->taken(); }
+std::vector<PassTime> Renderer::pass_times() { return impl_->base->times->take_times(); }
 
 unsigned Renderer::draw_projector(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   return impl_->projectors.draw(index, posed, viewer);

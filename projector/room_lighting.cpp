@@ -27,7 +27,7 @@ void RoomLighting::place(const scene::PosedScene& posed, const Pose& scene_from_
   viewer_light_.lamps[0].d_world = world_from_viewer * k_d_lamp_viewer;
   const std::optional<scene::RoomLight>& known = posed.light ? posed.light : room_;
   const scene::RoomLight& light = known ? *known : viewer_light_;
-  is_room_known_ = known.has_value();
+  has_room_light_ = known.has_value();
   d_up_ = homogeneous(scene_from_world.rotation * light.d_up_world);
   soft_below_ = homogeneous(light.below_rgb);
   soft_above_ = homogeneous(light.above_rgb);
@@ -40,7 +40,7 @@ void RoomLighting::place(const scene::PosedScene& posed, const Pose& scene_from_
 }
 
 void RoomLighting::bind(const Use& use) const {
-  use.program.set("u_is_room_known", is_room_known_);
+  use.program.set("u_has_room_light", has_room_light_);
   use.program.set("u_d_up", d_up_);
   use.program.set("u_soft_below", soft_below_);
   use.program.set("u_soft_above", soft_above_);

@@ -10,8 +10,8 @@
 
 namespace limn::projector {
 
-/// The light that parts are shaded by (shaders/look.glsl): the room's light if it is known, else soft light
-/// and a lamp that move with the viewer.
+/// The light that parts are shaded by (shaders/shading.glsl): the room's light if it is known, else soft
+/// light and a lamp that move with the viewer.
 class RoomLighting final : public Bindable {
  public:
   explicit RoomLighting(const std::optional<scene::RoomLight>& room);
@@ -23,7 +23,7 @@ class RoomLighting final : public Bindable {
  private:
   std::optional<scene::RoomLight> room_;
   scene::RoomLight viewer_light_;  // used where no room light is known
-  bool is_room_known_ = false;
+  bool has_room_light_ = false;
   Eigen::Vector4f d_up_, soft_below_, soft_above_;  // scene frame
   std::vector<Eigen::Vector4f> d_lamps_, lamps_;
 };

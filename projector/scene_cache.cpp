@@ -53,47 +53,49 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
     scene_from_world_ = GpuScene::scene_from_world(posed);
     scene_.place(runs_);
     if (!stays) ++prototype_moves_;
-    is_prototype_seen_ &= stays;
-    are_soft_edges_seen_ &= stays;
-    are_surface_parts_seen_ = false;
-    eye_kind_ = EyeKind::none;
+    is_prototype_drawn_ &= stays;
+    are_soft_edges_drawn_ &= stays;
+    are_surface_parts_drawn_ = false;
+    viewpoint_kind_ = ViewpointKind::none;
     prepared_ = posed;
   }
   const bool all = needed == FromProjectors::all;
-  if (needed == FromProjectors::nothing || (is_prototype_seen_ && !all) ||
-      (are_soft_edges_seen_ && are_surface_parts_seen_))
+  if (needed == FromProjectors::nothing || (is_prototype_drawn_ && !all) ||
+      (are_soft_edges_drawn_ && are_surface_parts_drawn_))
     return;
   const PassTimes::Scope scope(times_, "ids from projectors");
-  if (!is_prototype_seen_ || (all && !are_soft_edges_seen_)) {
+  if (!is_prototype_drawn_ || (all && !are_soft_edges_drawn_)) {
     visibility_.draw_prototype_from_projectors(scene_, runs_, scene_from_world_, all);
-    is_prototype_seen_ = true;
-    are_soft_edges_seen_ = all;
+    is_prototype_drawn_ = true;
+    are_soft_edges_drawn_ = all;
   }
   if (!all) return;
   visibility_.draw_surface_parts_from_projectors(scene_, runs_, scene_from_world_);
-  are_surface_parts_seen_ = true;
+  are_surface_parts_drawn_ = true;
 }
 
-void SceneCache::draw_from_eye(const Imager& viewer) {
-  if (eye_kind_ == EyeKind::eye && is_same(eye_.imager_from_world, viewer.imager_from_world)) return;
+void SceneCache::draw_from_viewer(const Imager& viewer) {
+  if (viewpoint_kind_ == ViewpointKind::viewer &&
+      is_same(viewpoint_imager_.imager_from_world, viewer.imager_from_world))
+    return;
   const Pose scene_from_viewer = scene_from_world_ * viewer.imager_from_world.inverse();
   const PassTimes::Scope scope(times_, "ids from the viewer");
-  visibility_.draw_from_eye(scene_, runs_, scene_from_world_, scene_from_viewer.translation,
-                            scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
-  eye_kind_ = EyeKind::eye;
-  eye_ = viewer;
+  visibility_.draw_from_viewer(scene_, runs_, scene_from_world_, scene_from_viewer.translation,
+                               scene_from_viewer.rotation * -Eigen::Vector3d::UnitY());
+  viewpoint_kind_ = ViewpointKind::viewer;
+  viewpoint_imager_ = viewer;
 }
 
 void SceneCache::draw_from_imager(const Imager& imager, bool parts_alone) {
-  const EyeKind wanted = parts_alone ? EyeKind::parts_of_imager : EyeKind::imager;
-  if (eye_kind_ == wanted && is_same_lens(eye_, imager) &&
-      is_same(eye_.imager_from_world, imager.imager_from_world)) {
+  const ViewpointKind wanted = parts_alone ? ViewpointKind::parts_of_imager : ViewpointKind::imager;
+  if (viewpoint_kind_ == wanted && is_same_lens(viewpoint_imager_, imager) &&
+      is_same(viewpoint_imager_.imager_from_world, imager.imager_from_world)) {
     return;
   }
   const PassTimes::Scope scope(times_, "ids from a camera");
   visibility_.draw_from_imager(scene_, runs_, scene_from_world_, imager, lens_of(imager).baked, parts_alone);
-  eye_kind_ = wanted;
-  eye_ = imager;
+  viewpoint_kind_ = wanted;
+  viewpoint_imager_ = imager;
 }
 
 void SceneCache::draw_from_reference_camera(const Imager& camera) {

@@ -33,7 +33,7 @@ class SceneCache {
   void prepare(const scene::PosedScene& posed, FromProjectors needed);
   /// Draws the ids that a viewer or an imager sees of the prepared scene; `parts_alone`: only where parts may
   /// be.
-  void draw_from_eye(const Imager& viewer);
+  void draw_from_viewer(const Imager& viewer);
   void draw_from_imager(const Imager& imager, bool parts_alone = false);
   /// Draws the ids that the reference camera sees of the prepared scene, and keeps them.
   void draw_from_reference_camera(const Imager& camera);
@@ -66,12 +66,12 @@ class SceneCache {
   std::optional<scene::PosedScene> prepared_;
   unsigned prototype_moves_ = 0;
   // Which of the projectors' ids are drawn for `prepared_`.
-  bool is_prototype_seen_ = false, are_soft_edges_seen_ = false, are_surface_parts_seen_ = false;
+  bool is_prototype_drawn_ = false, are_soft_edges_drawn_ = false, are_surface_parts_drawn_ = false;
   std::vector<PlacedRun> runs_;
   Pose scene_from_world_;
-  enum class EyeKind { none, imager, parts_of_imager, eye };
-  EyeKind eye_kind_ = EyeKind::none;
-  Imager eye_;
+  enum class ViewpointKind { none, imager, parts_of_imager, viewer };
+  ViewpointKind viewpoint_kind_ = ViewpointKind::none;
+  Imager viewpoint_imager_;
   std::vector<std::pair<Imager, GpuLens>> lenses_;  // lenses of cameras and viewers, the newest last
 };
 

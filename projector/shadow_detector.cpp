@@ -25,10 +25,10 @@ constexpr std::uint8_t k_too_bright = 250;  // grey level that counts as overexp
 constexpr float k_least_weight = 0.02F;     // weight of a patch without light among illuminated ones
 // Limit for each patch, so that none decides alone: five standard deviations.
 constexpr float k_most_cost = 25;
-constexpr float k_unlike_cost = 9;  // a patch with a higher cost fits no explanation
-constexpr float k_like_cost = 4;    // a patch with a lower cost has not changed
-constexpr float k_change_cost = 3;  // cost of a change of one projector's state
-constexpr float k_least_vote = 1;   // least difference of a cell's votes that changes its state
+constexpr float k_unexplained_cost = 9;  // a patch with a higher cost fits no explanation
+constexpr float k_unchanged_cost = 4;    // a patch with a lower cost has not changed
+constexpr float k_change_cost = 3;       // cost of a change of one projector's state
+constexpr float k_least_vote = 1;        // least difference of a cell's votes that changes its state
 constexpr float k_most_vote = 10;
 // Limits for the blocked cells among the eight neighbours.
 constexpr float k_most_others = 5, k_few_others = 2;
@@ -36,7 +36,7 @@ constexpr float k_stale_votes = 0.5F;  // factor for old votes when the next fra
 // After this many frames without an explanation, the patch is learned afresh.
 constexpr std::uint8_t k_patience = 60;
 // Labels that are not sets of projectors.
-constexpr std::uint8_t k_no_label = 255, k_unlike = 254, k_dark = 253;
+constexpr std::uint8_t k_no_label = 255, k_unexplained = 254, k_dark = 253;
 constexpr float k_infinity = 1e30F;
 constexpr std::size_t k_all_sets = 4;  // with more projectors, no three are assumed blocked at one point
 constexpr std::size_t k_most_projectors = 7;  // so that all sets of projectors fit into the labels
@@ -49,8 +49,8 @@ double typical_distance(const cv::Mat& places, int dimensions) {
       const auto& a = places.at<cv::Vec4f>(row, column - 1);
       const auto& b = places.at<cv::Vec4f>(row, column);
       // Channel that says whether there is a value: the irradiance, or w of a point.
-      const int given = dimensions == 3 ? 3 : 2;
-      if (!(a[given] > 0 && b[given] > 0)) continue;
+      const int value_channel = dimensions == 3 ? 3 : 2;
+      if (!(a[value_channel] > 0 && b[value_channel] > 0)) continue;
       double sum = 0;
       for (int k = 0; k < dimensions; ++k) sum += std::pow(static_cast<double>(a[k] - b[k]), 2);
       distances.push_back(std::sqrt(sum));
@@ -89,25 +89,25 @@ float square(float value) { return value * value; }
 
 // The light that a model predicts for the arriving light `x` (1 for the offset, then one value for each
 // projector).
-struct Foretold {
+struct Prediction {
   float mean = 0, variance = 0;
 };
 
-Foretold foretold(const float* belief, const float* x, std::size_t d) {
-  Foretold out;
-  const float* covariance = belief + d;
+Prediction predicted(const float* model, const float* x, std::size_t d) {
+  Prediction out;
+  const float* covariance = model + d;
   for (std::size_t i = 0; i < d; ++i) {
     if (x[i] == 0) continue;
-    out.mean += belief[i] * x[i];
+    out.mean += model[i] * x[i];
     for (std::size_t j = 0; j < d; ++j) out.variance += x[i] * covariance[i * d + j] * x[j];
   }
   return out;
 }
 
 // Updates the model with the measured light and its variance (Kalman filter).
-void take_in(float light, const float* x, float variance, std::size_t d, float* belief) {
-  float* covariance = belief + d;
-  const Foretold f = foretold(belief, x, d);
+void update_model(float light, const float* x, float variance, std::size_t d, float* model) {
+  float* covariance = model + d;
+  const Prediction f = predicted(model, x, d);
   float gain[k_most_projectors + 1], length_2 = 0;
   for (std::size_t i = 0; i < d; ++i) {
     gain[i] = 0;
@@ -117,7 +117,7 @@ void take_in(float light, const float* x, float variance, std::size_t d, float* 
   const float whole = f.variance + variance;
   const float drift = square(k_drift * light / length_2);
   for (std::size_t i = 0; i < d; ++i) {
-    belief[i] += gain[i] / whole * (light - f.mean);
+    model[i] += gain[i] / whole * (light - f.mean);
     for (std::size_t j = 0; j < d; ++j)
       covariance[i * d + j] += drift * x[i] * x[j] - gain[i] * gain[j] / whole;
   }
@@ -131,7 +131,7 @@ struct Source {
   cv::Mat map;
 };
 
-struct Watch {
+struct CameraState {
   Imager imager;
   cv::Mat light;  // CV_32F, 1 x 256: light of each grey level
   IlluminatedPatches patches;
@@ -141,37 +141,38 @@ struct Watch {
   int channels = 0;
   // For each patch and channel: mean (offset, then gains), covariance, and the projectors' light at the last
   // update.
-  std::vector<float> beliefs;
-  std::vector<std::uint8_t> unlike;  // for each patch: number of consecutive frames without an explanation
+  std::vector<float> models;
+  // For each patch: number of consecutive frames without an explanation.
+  std::vector<std::uint8_t> unexplained;
   // For each projector CV_32FC2, one pixel for each cell: votes for free and for blocked.
   std::vector<cv::Mat> votes;
 };
 
 // The evaluation of one frame, patch by patch.
-struct Sight {
-  cv::Mat light;                 // CV_32F, with the camera's number of channels: measured light
-  std::vector<cv::Mat> given;    // same type: irradiance x light from each projector if all of it arrives
-  cv::Mat usable;                // CV_8U: illuminated by a projector and not overexposed
-  std::vector<cv::Mat> costs;    // CV_32F for each explanation: its cost around each patch
-  std::vector<cv::Mat> misfits;  // the same without the logarithm of the variance
-  cv::Mat labels;                // CV_8U: the set of blocked projectors, or k_unlike, k_dark or k_no_label
+struct Evaluation {
+  cv::Mat light;                   // CV_32F, with the camera's number of channels: measured light
+  std::vector<cv::Mat> unblocked;  // same type: irradiance x light from each projector if all of it arrives
+  cv::Mat usable;                  // CV_8U: illuminated by a projector and not overexposed
+  std::vector<cv::Mat> costs;      // CV_32F for each explanation: its cost around each patch
+  std::vector<cv::Mat> misfits;    // the same without the logarithm of the variance
+  cv::Mat labels;  // CV_8U: the set of blocked projectors, or k_unexplained, k_dark or k_no_label
   // CV_32F for each projector: by how much the label's cost is lower than that of the alternative.
   std::vector<cv::Mat> gaps;
 };
 
 // The index of the patch that a point of the prototype had before the prototype moved.
-std::optional<std::size_t> patch_of(const Watch& watch, const cv::Vec4f& point) {
+std::optional<std::size_t> patch_of(const CameraState& camera, const cv::Vec4f& point) {
   if (!(point[3] > 0)) return std::nullopt;
-  const IlluminatedPatches& patches = watch.patches;
+  const IlluminatedPatches& patches = camera.patches;
   const Eigen::Vector3d p = Eigen::Vector3f(point[0], point[1], point[2]).cast<double>();
-  const auto px = watch.imager.project(patches.prototype_from_world.inverse() * p);
-  if (!px || !watch.imager.contains(*px)) return std::nullopt;
+  const auto px = camera.imager.project(patches.prototype_from_world.inverse() * p);
+  if (!px || !camera.imager.contains(*px)) return std::nullopt;
   const int column = static_cast<int>((px->x() + 0.5) / patches.side_px);
   const int row = static_cast<int>((px->y() + 0.5) / patches.side_px);
   if (column >= patches.points.cols || row >= patches.points.rows) return std::nullopt;
   const auto& q = patches.points.at<cv::Vec4f>(row, column);
   const bool is_same =
-      q[3] > 0 && (Eigen::Vector3f(q[0], q[1], q[2]).cast<double>() - p).norm() < watch.spacing_m;
+      q[3] > 0 && (Eigen::Vector3f(q[0], q[1], q[2]).cast<double>() - p).norm() < camera.spacing_m;
   if (!is_same) return std::nullopt;  // the point was hidden by another side of the prototype
   return static_cast<std::size_t>(row * patches.points.cols + column);
 }
@@ -181,7 +182,7 @@ std::optional<std::size_t> patch_of(const Watch& watch, const cv::Vec4f& point) 
 struct ShadowDetector::Impl {
   ShadowDetectorOptions options;
   std::vector<Source> sources;
-  std::vector<Watch> watches;
+  std::vector<CameraState> cameras;
   std::vector<unsigned> explanations;  // the sets of blocked projectors that are tried, as bits
 
   Impl(const Rig& rig, const ShadowDetectorOptions& options_in) : options(options_in) {
@@ -192,41 +193,43 @@ struct ShadowDetector::Impl {
                          cv::Mat(size, CV_8U, cv::Scalar(0)), cv::Mat(size, CV_32F, cv::Scalar(1))});
     }
     for (const Imager& imager : rig.cameras) {
-      Watch watch;
-      watch.imager = imager;
-      watch.light = light_of_levels(rig, imager.name);
+      CameraState camera;
+      camera.imager = imager;
+      camera.light = light_of_levels(rig, imager.name);
       for (const Source& source : sources)
-        watch.votes.emplace_back(source.blocked.size(), CV_32FC2, cv::Scalar::all(0));
-      watches.push_back(std::move(watch));
+        camera.votes.emplace_back(source.blocked.size(), CV_32FC2, cv::Scalar::all(0));
+      cameras.push_back(std::move(camera));
     }
     for (unsigned set = 0; set < 1U << sources.size(); ++set)
       if (sources.size() <= k_all_sets || std::popcount(set) <= 2) explanations.push_back(set);
   }
 
   std::size_t dimensions() const { return sources.size() + 1; }
-  std::size_t belief_size() const { return dimensions() * (dimensions() + 1) + sources.size(); }
-  cv::Point cell_of(const cv::Vec4f& lit) const {
-    return {static_cast<int>((lit[0] + 0.5F) / static_cast<float>(options.cell_px)),
-            static_cast<int>((lit[1] + 0.5F) / static_cast<float>(options.cell_px))};
+  std::size_t model_size() const { return dimensions() * (dimensions() + 1) + sources.size(); }
+  cv::Point cell_of(const cv::Vec4f& patch_light) const {
+    return {static_cast<int>((patch_light[0] + 0.5F) / static_cast<float>(options.cell_px)),
+            static_cast<int>((patch_light[1] + 0.5F) / static_cast<float>(options.cell_px))};
   }
 
-  void forget(Watch* watch, std::size_t patch) const;
-  void forget_all(Watch* watch) const;
-  Sight sight_of(const Watch& watch, const cv::Mat& frame, std::span<const cv::Mat> shown) const;
-  float variance_of(const float* belief, const float* x) const;
-  void explain(const Watch& watch, Sight* viewpoint) const;
-  std::pair<unsigned, unsigned> reached_and_blocked(const Watch& watch, int row, int column) const;
-  void choose(const Watch& watch, Sight* viewpoint) const;
-  void vote(const Sight& viewpoint, Watch* watch) const;
+  void reset_model(CameraState* camera, std::size_t patch) const;
+  void reset_models(CameraState* camera) const;
+  Evaluation evaluation_of(const CameraState& camera,
+                           const cv::Mat& frame,
+                           std::span<const cv::Mat> shown) const;
+  float variance_of(const float* model, const float* x) const;
+  void compute_costs(const CameraState& camera, Evaluation* evaluation) const;
+  std::pair<unsigned, unsigned> reached_and_blocked(const CameraState& camera, int row, int column) const;
+  void choose_explanations(const CameraState& camera, Evaluation* evaluation) const;
+  void collect_votes(const Evaluation& evaluation, CameraState* camera) const;
   bool count_votes();
-  void learn(const Sight& viewpoint, Watch* watch) const;
+  void update_models(const Evaluation& evaluation, CameraState* camera) const;
 };
 
-void ShadowDetector::Impl::forget(Watch* watch, std::size_t patch) const {
+void ShadowDetector::Impl::reset_model(CameraState* camera, std::size_t patch) const {
   const std::size_t d = dimensions();
-  const auto channels = static_cast<std::size_t>(watch->channels);
+  const auto channels = static_cast<std::size_t>(camera->channels);
   for (std::size_t c = 0; c < channels; ++c) {
-    float* mean = &watch->beliefs[(patch * channels + c) * belief_size()];
+    float* mean = &camera->models[(patch * channels + c) * model_size()];
     float* covariance = mean + d;
     for (std::size_t i = 0; i < d; ++i) {
       mean[i] = i == 0 ? k_offset : k_gain;
@@ -238,92 +241,92 @@ void ShadowDetector::Impl::forget(Watch* watch, std::size_t patch) const {
     }
     std::fill_n(covariance + d * d, sources.size(), 0.0F);
   }
-  watch->unlike[patch] = 0;
+  camera->unexplained[patch] = 0;
 }
 
-void ShadowDetector::Impl::forget_all(Watch* watch) const {
-  const std::size_t patches = watch->patches.points.total();
-  watch->beliefs.resize(patches * static_cast<std::size_t>(watch->channels) * belief_size());
-  watch->unlike.assign(patches, 0);
-  for (std::size_t patch = 0; patch < patches; ++patch) forget(watch, patch);
+void ShadowDetector::Impl::reset_models(CameraState* camera) const {
+  const std::size_t patches = camera->patches.points.total();
+  camera->models.resize(patches * static_cast<std::size_t>(camera->channels) * model_size());
+  camera->unexplained.assign(patches, 0);
+  for (std::size_t patch = 0; patch < patches; ++patch) reset_model(camera, patch);
 }
 
-Sight ShadowDetector::Impl::sight_of(const Watch& watch,
-                                     const cv::Mat& frame,
-                                     std::span<const cv::Mat> shown) const {
-  Sight viewpoint;
-  const IlluminatedPatches& patches = watch.patches;
+Evaluation ShadowDetector::Impl::evaluation_of(const CameraState& camera,
+                                               const cv::Mat& frame,
+                                               std::span<const cv::Mat> shown) const {
+  Evaluation evaluation;
+  const IlluminatedPatches& patches = camera.patches;
   const cv::Size size = patches.points.size();
-  const cv::Rect seen(0, 0, size.width * patches.side_px, size.height * patches.side_px);
-  viewpoint.light = in_patches(frame(seen), watch.light, size);
-  viewpoint.usable = cv::Mat(size, CV_8U, cv::Scalar(0));
+  const cv::Rect covered(0, 0, size.width * patches.side_px, size.height * patches.side_px);
+  evaluation.light = in_patches(frame(covered), camera.light, size);
+  evaluation.usable = cv::Mat(size, CV_8U, cv::Scalar(0));
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const Source& source = sources[i];
     cv::Mat image = shown[i], light, place[4], irradiance;
     if (image.empty()) image = cv::Mat(source.height, source.width, CV_8UC3, cv::Scalar::all(0));
     LIMN_CHECK(image.type() == CV_8UC3 && image.cols == source.width && image.rows == source.height);
     cv::LUT(image, source.light, light);
-    if (watch.channels == 1) light = luminance(light);
-    const int side = watch.footprints[i];
+    if (camera.channels == 1) light = luminance(light);
+    const int side = camera.footprints[i];
     cv::blur(light, light, {side, side}, {-1, -1}, cv::BORDER_REPLICATE);
     cv::split(patches.by_projector[i], place);
     cv::remap(light, light, place[0], place[1], cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-    viewpoint.usable |= place[2] > 0;
-    irradiance = place[2] / watch.typical_irradiance;
-    cv::merge(std::vector<cv::Mat>(static_cast<std::size_t>(watch.channels), irradiance), irradiance);
-    viewpoint.given.push_back(light.mul(irradiance));
+    evaluation.usable |= place[2] > 0;
+    irradiance = place[2] / camera.typical_irradiance;
+    cv::merge(std::vector<cv::Mat>(static_cast<std::size_t>(camera.channels), irradiance), irradiance);
+    evaluation.unblocked.push_back(light.mul(irradiance));
   }
-  viewpoint.usable.setTo(0, too_bright(frame(seen), size));
-  return viewpoint;
+  evaluation.usable.setTo(0, too_bright(frame(covered), size));
+  return evaluation;
 }
 
 // The variance of a patch's light in addition to the model's own variance.
-float ShadowDetector::Impl::variance_of(const float* belief, const float* x) const {
+float ShadowDetector::Impl::variance_of(const float* model, const float* x) const {
   const std::size_t d = dimensions();
-  const float* last = belief + d + d * d;
+  const float* last = model + d + d * d;
   float change = 0;
-  for (std::size_t i = 0; i < sources.size(); ++i) change += belief[i + 1] * (x[i + 1] - last[i]);
-  return square(k_noise) + square(k_offset_unmodelled * belief[0]) +
+  for (std::size_t i = 0; i < sources.size(); ++i) change += model[i + 1] * (x[i + 1] - last[i]);
+  return square(k_noise) + square(k_offset_unmodelled * model[0]) +
          square(static_cast<float>(options.unmodelled) * change);
 }
 
 // Computes the cost of each explanation: minus twice its log-likelihood, averaged over the channels and the
 // neighbouring patches. Brightly illuminated patches have the highest weight.
-void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
+void ShadowDetector::Impl::compute_costs(const CameraState& camera, Evaluation* evaluation) const {
   const std::size_t n = sources.size(), d = dimensions();
-  const auto channels = static_cast<std::size_t>(watch.channels);
-  const cv::Size size = viewpoint->light.size();
+  const auto channels = static_cast<std::size_t>(camera.channels);
+  const cv::Size size = evaluation->light.size();
   for (std::size_t k = 0; k < explanations.size(); ++k) {
-    viewpoint->costs.emplace_back(size, CV_32F, cv::Scalar(0));
-    viewpoint->misfits.emplace_back(size, CV_32F, cv::Scalar(0));
+    evaluation->costs.emplace_back(size, CV_32F, cv::Scalar(0));
+    evaluation->misfits.emplace_back(size, CV_32F, cv::Scalar(0));
   }
   cv::Mat weight(size, CV_32F, cv::Scalar(0));
   cv::parallel_for_({0, size.height}, [&](const cv::Range& rows) {
     float x[k_most_projectors + 1] = {1};
     for (int row = rows.start; row < rows.end; ++row)
       for (int column = 0; column < size.width; ++column) {
-        if (!viewpoint->usable.at<std::uint8_t>(row, column)) continue;
+        if (!evaluation->usable.at<std::uint8_t>(row, column)) continue;
         const auto patch = static_cast<std::size_t>(row * size.width + column);
         for (std::size_t c = 0; c < channels; ++c) {
-          const float* belief = &watch.beliefs[(patch * channels + c) * belief_size()];
+          const float* model = &camera.models[(patch * channels + c) * model_size()];
           const auto value = [&](const cv::Mat& m) {
             return m.ptr<float>(row)[static_cast<std::size_t>(column) * channels + c];
           };
-          const float light = value(viewpoint->light);
+          const float light = value(evaluation->light);
           float brightest = 0;
           for (std::size_t i = 0; i < n; ++i)
-            brightest = std::max(brightest, belief[i + 1] * value(viewpoint->given[i]));
-          const float tells = std::max(k_least_weight, brightest / (brightest + 2 * k_noise));
-          weight.at<float>(row, column) += tells;
+            brightest = std::max(brightest, model[i + 1] * value(evaluation->unblocked[i]));
+          const float patch_weight = std::max(k_least_weight, brightest / (brightest + 2 * k_noise));
+          weight.at<float>(row, column) += patch_weight;
           for (std::size_t k = 0; k < explanations.size(); ++k) {
             for (std::size_t i = 0; i < n; ++i)
-              x[i + 1] = (explanations[k] >> i & 1U) != 0 ? 0 : value(viewpoint->given[i]);
-            const Foretold f = foretold(belief, x, d);
-            const float variance = f.variance + variance_of(belief, x);
+              x[i + 1] = (explanations[k] >> i & 1U) != 0 ? 0 : value(evaluation->unblocked[i]);
+            const Prediction f = predicted(model, x, d);
+            const float variance = f.variance + variance_of(model, x);
             const float misfit = std::min(k_most_cost, square(f.mean - light) / variance);
-            viewpoint->misfits[k].at<float>(row, column) += tells * misfit;
-            viewpoint->costs[k].at<float>(row, column) +=
-                tells * (misfit + std::log(variance / square(k_noise)));
+            evaluation->misfits[k].at<float>(row, column) += patch_weight * misfit;
+            evaluation->costs[k].at<float>(row, column) +=
+                patch_weight * (misfit + std::log(variance / square(k_noise)));
           }
         }
       }
@@ -333,7 +336,7 @@ void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
   };
   around(weight);
   weight = cv::max(weight, k_least_weight);
-  for (std::vector<cv::Mat>* sums : {&viewpoint->costs, &viewpoint->misfits})
+  for (std::vector<cv::Mat>* sums : {&evaluation->costs, &evaluation->misfits})
     for (cv::Mat& sum : *sums) {
       around(sum);
       sum /= weight;
@@ -341,15 +344,15 @@ void ShadowDetector::Impl::explain(const Watch& watch, Sight* viewpoint) const {
 }
 
 // The set of projectors that reach a patch, and the subset whose light was blocked at the last frame.
-std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const Watch& watch,
+std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const CameraState& camera,
                                                                         int row,
                                                                         int column) const {
   unsigned reached = 0, blocked = 0;
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    const auto& lit = watch.patches.by_projector[i].at<cv::Vec4f>(row, column);
-    if (!(lit[2] > 0)) continue;
+    const auto& patch_light = camera.patches.by_projector[i].at<cv::Vec4f>(row, column);
+    if (!(patch_light[2] > 0)) continue;
     reached |= 1U << i;
-    if (sources[i].blocked.at<std::uint8_t>(cell_of(lit)) != 0) blocked |= 1U << i;
+    if (sources[i].blocked.at<std::uint8_t>(cell_of(patch_light)) != 0) blocked |= 1U << i;
   }
   return {reached, blocked};
 }
@@ -357,15 +360,15 @@ std::pair<unsigned, unsigned> ShadowDetector::Impl::reached_and_blocked(const Wa
 // Chooses the explanation with the least cost around each patch; each change of a projector's state adds to
 // the cost. Where no light arrives at all (k_dark), the state stays: no projector can fill the shadow, and it
 // may be a dark thing before the camera.
-void ShadowDetector::Impl::choose(const Watch& watch, Sight* viewpoint) const {
-  const cv::Size size = viewpoint->light.size();
-  viewpoint->labels = cv::Mat(size, CV_8U, cv::Scalar(k_no_label));
-  for (std::size_t i = 0; i < sources.size(); ++i) viewpoint->gaps.emplace_back(size, CV_32F, cv::Scalar(0));
+void ShadowDetector::Impl::choose_explanations(const CameraState& camera, Evaluation* evaluation) const {
+  const cv::Size size = evaluation->light.size();
+  evaluation->labels = cv::Mat(size, CV_8U, cv::Scalar(k_no_label));
+  for (std::size_t i = 0; i < sources.size(); ++i) evaluation->gaps.emplace_back(size, CV_32F, cv::Scalar(0));
   for (int row = 0; row < size.height; ++row)
     for (int column = 0; column < size.width; ++column) {
-      if (!viewpoint->usable.at<std::uint8_t>(row, column)) continue;
-      const auto [reached, before] = reached_and_blocked(watch, row, column);
-      const auto cost = [&](std::size_t k) { return viewpoint->costs[k].at<float>(row, column); };
+      if (!evaluation->usable.at<std::uint8_t>(row, column)) continue;
+      const auto [reached, before] = reached_and_blocked(camera, row, column);
+      const auto cost = [&](std::size_t k) { return evaluation->costs[k].at<float>(row, column); };
       std::size_t best = 0, unchanged = 0;
       float least = k_infinity;
       for (std::size_t k = 0; k < explanations.size(); ++k) {
@@ -376,17 +379,17 @@ void ShadowDetector::Impl::choose(const Watch& watch, Sight* viewpoint) const {
         least = cost(k) + k_change_cost * changes;
         best = k;
       }
-      const auto misfit = [&](std::size_t k) { return viewpoint->misfits[k].at<float>(row, column); };
-      if (misfit(unchanged) < k_like_cost) best = unchanged;
+      const auto misfit = [&](std::size_t k) { return evaluation->misfits[k].at<float>(row, column); };
+      if (misfit(unchanged) < k_unchanged_cost) best = unchanged;
       if (explanations[best] == reached) {
-        viewpoint->labels.at<std::uint8_t>(row, column) = k_dark;
+        evaluation->labels.at<std::uint8_t>(row, column) = k_dark;
         continue;
       }
-      if (misfit(best) > k_unlike_cost) {
-        viewpoint->labels.at<std::uint8_t>(row, column) = k_unlike;
+      if (misfit(best) > k_unexplained_cost) {
+        evaluation->labels.at<std::uint8_t>(row, column) = k_unexplained;
         continue;
       }
-      viewpoint->labels.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(explanations[best]);
+      evaluation->labels.at<std::uint8_t>(row, column) = static_cast<std::uint8_t>(explanations[best]);
       for (std::size_t i = 0; i < sources.size(); ++i) {
         const unsigned bit = 1U << i;
         if ((reached & bit) == 0) continue;
@@ -397,21 +400,21 @@ void ShadowDetector::Impl::choose(const Watch& watch, Sight* viewpoint) const {
             if ((explanations[k] & ~reached) == 0 && ((explanations[k] ^ explanations[best]) & bit) != 0)
               otherwise = std::min(otherwise, cost(k));
         }
-        viewpoint->gaps[i].at<float>(row, column) = std::clamp(otherwise - cost(best), 0.0F, k_most_vote);
+        evaluation->gaps[i].at<float>(row, column) = std::clamp(otherwise - cost(best), 0.0F, k_most_vote);
       }
     }
 }
 
-void ShadowDetector::Impl::vote(const Sight& viewpoint, Watch* watch) const {
+void ShadowDetector::Impl::collect_votes(const Evaluation& evaluation, CameraState* camera) const {
   for (std::size_t i = 0; i < sources.size(); ++i) {
-    watch->votes[i].setTo(0);
-    for (int row = 0; row < viewpoint.labels.rows; ++row)
-      for (int column = 0; column < viewpoint.labels.cols; ++column) {
-        const std::uint8_t label = viewpoint.labels.at<std::uint8_t>(row, column);
-        const auto& lit = watch->patches.by_projector[i].at<cv::Vec4f>(row, column);
-        if (label >= k_dark || !(lit[2] > 0)) continue;
-        watch->votes[i].at<cv::Vec2f>(cell_of(lit))[label >> i & 1] +=
-            viewpoint.gaps[i].at<float>(row, column);
+    camera->votes[i].setTo(0);
+    for (int row = 0; row < evaluation.labels.rows; ++row)
+      for (int column = 0; column < evaluation.labels.cols; ++column) {
+        const std::uint8_t label = evaluation.labels.at<std::uint8_t>(row, column);
+        const auto& patch_light = camera->patches.by_projector[i].at<cv::Vec4f>(row, column);
+        if (label >= k_dark || !(patch_light[2] > 0)) continue;
+        camera->votes[i].at<cv::Vec2f>(cell_of(patch_light))[label >> i & 1] +=
+            evaluation.gaps[i].at<float>(row, column);
       }
   }
 }
@@ -420,8 +423,8 @@ bool ShadowDetector::Impl::count_votes() {
   bool changed = false;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     Source& source = sources[i];
-    cv::Mat votes = watches.front().votes[i].clone(), counted = source.blocked.clone();
-    for (std::size_t k = 1; k < watches.size(); ++k) votes += watches[k].votes[i];
+    cv::Mat votes = cameras.front().votes[i].clone(), counted = source.blocked.clone();
+    for (std::size_t k = 1; k < cameras.size(); ++k) votes += cameras[k].votes[i];
     for (int row = 0; row < votes.rows; ++row)
       for (int column = 0; column < votes.cols; ++column) {
         const cv::Vec2f& vote = votes.at<cv::Vec2f>(row, column);
@@ -449,37 +452,38 @@ bool ShadowDetector::Impl::count_votes() {
 }
 
 // Updates the models of patches that have the same explanation as all patches around them.
-void ShadowDetector::Impl::learn(const Sight& viewpoint, Watch* watch) const {
+void ShadowDetector::Impl::update_models(const Evaluation& evaluation, CameraState* camera) const {
   const std::size_t n = sources.size(), d = dimensions();
-  const auto channels = static_cast<std::size_t>(watch->channels);
-  const cv::Size size = viewpoint.labels.size();
-  cv::Mat lowest, highest = viewpoint.labels.clone();
+  const auto channels = static_cast<std::size_t>(camera->channels);
+  const cv::Size size = evaluation.labels.size();
+  cv::Mat lowest, highest = evaluation.labels.clone();
   const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {5, 5});
-  cv::erode(viewpoint.labels, lowest, around);
-  highest.setTo(0, viewpoint.labels == k_no_label);
+  cv::erode(evaluation.labels, lowest, around);
+  highest.setTo(0, evaluation.labels == k_no_label);
   cv::dilate(highest, highest, around);
   float x[k_most_projectors + 1] = {1};
   for (int row = 0; row < size.height; ++row)
     for (int column = 0; column < size.width; ++column) {
-      const std::uint8_t label = viewpoint.labels.at<std::uint8_t>(row, column);
+      const std::uint8_t label = evaluation.labels.at<std::uint8_t>(row, column);
       const auto patch = static_cast<std::size_t>(row * size.width + column);
       if (label == k_no_label) continue;
-      if (label == k_unlike) {
-        if (++watch->unlike[patch] >= k_patience) forget(watch, patch);
+      if (label == k_unexplained) {
+        if (++camera->unexplained[patch] >= k_patience) reset_model(camera, patch);
         continue;
       }
-      watch->unlike[patch] = 0;
+      camera->unexplained[patch] = 0;
       if (label == k_dark) continue;
       if (lowest.at<std::uint8_t>(row, column) != label || highest.at<std::uint8_t>(row, column) != label)
         continue;
       for (std::size_t c = 0; c < channels; ++c) {
-        float* belief = &watch->beliefs[(patch * channels + c) * belief_size()];
+        float* model = &camera->models[(patch * channels + c) * model_size()];
         const auto value = [&](const cv::Mat& m) {
           return m.ptr<float>(row)[static_cast<std::size_t>(column) * channels + c];
         };
-        for (std::size_t i = 0; i < n; ++i) x[i + 1] = (label >> i & 1) != 0 ? 0 : value(viewpoint.given[i]);
-        take_in(value(viewpoint.light), x, variance_of(belief, x), d, belief);
-        std::copy_n(x + 1, n, belief + d + d * d);
+        for (std::size_t i = 0; i < n; ++i)
+          x[i + 1] = (label >> i & 1) != 0 ? 0 : value(evaluation.unblocked[i]);
+        update_model(value(evaluation.light), x, variance_of(model, x), d, model);
+        std::copy_n(x + 1, n, model + d + d * d);
       }
     }
 }
@@ -491,49 +495,49 @@ ShadowDetector& ShadowDetector::operator=(ShadowDetector&&) noexcept = default;
 ShadowDetector::~ShadowDetector() = default;
 
 void ShadowDetector::place(std::size_t index, IlluminatedPatches patches) {
-  Watch& watch = impl_->watches.at(index);
+  CameraState& camera = impl_->cameras.at(index);
   LIMN_CHECK(patches.side_px > 0 && patches.by_projector.size() == impl_->sources.size());
-  const Watch before = watch;
+  const CameraState before = camera;
   const bool is_first = before.patches.points.empty();
-  watch.patches = std::move(patches);
-  const cv::Mat& points = watch.patches.points;
-  watch.spacing_m = typical_distance(points, 3);
-  watch.footprints.clear();
+  camera.patches = std::move(patches);
+  const cv::Mat& points = camera.patches.points;
+  camera.spacing_m = typical_distance(points, 3);
+  camera.footprints.clear();
   std::vector<double> irradiances;
-  for (const cv::Mat& lit : watch.patches.by_projector) {
-    watch.footprints.push_back(std::max(1, cvRound(typical_distance(lit, 2))));
-    for (const auto& pixel : cv::Mat_<cv::Vec4f>(lit))
+  for (const cv::Mat& patch_light : camera.patches.by_projector) {
+    camera.footprints.push_back(std::max(1, cvRound(typical_distance(patch_light, 2))));
+    for (const auto& pixel : cv::Mat_<cv::Vec4f>(patch_light))
       if (pixel[2] > 0) irradiances.push_back(static_cast<double>(pixel[2]));
   }
-  if (is_first) watch.typical_irradiance = median(std::move(irradiances), 1.0);
-  impl_->forget_all(&watch);
-  if (is_first || watch.channels == 0) return;
-  const std::size_t size = static_cast<std::size_t>(watch.channels) * impl_->belief_size();
+  if (is_first) camera.typical_irradiance = median(std::move(irradiances), 1.0);
+  impl_->reset_models(&camera);
+  if (is_first || camera.channels == 0) return;
+  const std::size_t size = static_cast<std::size_t>(camera.channels) * impl_->model_size();
   for (int row = 0; row < points.rows; ++row)
     for (int column = 0; column < points.cols; ++column)
       if (const auto from = patch_of(before, points.at<cv::Vec4f>(row, column))) {
         const auto to = static_cast<std::size_t>(row * points.cols + column);
-        std::copy_n(&before.beliefs[*from * size], size, &watch.beliefs[to * size]);
+        std::copy_n(&before.models[*from * size], size, &camera.models[to * size]);
       }
 }
 
-bool ShadowDetector::see(std::size_t index, const cv::Mat& frame, std::span<const cv::Mat> shown) {
-  Watch& watch = impl_->watches.at(index);
+bool ShadowDetector::update_maps(std::size_t index, const cv::Mat& frame, std::span<const cv::Mat> shown) {
+  CameraState& camera = impl_->cameras.at(index);
   LIMN_CHECK(frame.type() == CV_8UC1 || frame.type() == CV_8UC3);
-  LIMN_CHECK(frame.cols == watch.imager.width && frame.rows == watch.imager.height);
+  LIMN_CHECK(frame.cols == camera.imager.width && frame.rows == camera.imager.height);
   LIMN_CHECK(shown.size() == impl_->sources.size());
-  if (watch.patches.points.empty()) return false;
-  if (watch.channels != frame.channels()) {
-    watch.channels = frame.channels();
-    impl_->forget_all(&watch);
+  if (camera.patches.points.empty()) return false;
+  if (camera.channels != frame.channels()) {
+    camera.channels = frame.channels();
+    impl_->reset_models(&camera);
   }
-  Sight viewpoint = impl_->sight_of(watch, frame, shown);
-  impl_->explain(watch, &viewpoint);
-  impl_->choose(watch, &viewpoint);
-  for (Watch& other : impl_->watches)
+  Evaluation evaluation = impl_->evaluation_of(camera, frame, shown);
+  impl_->compute_costs(camera, &evaluation);
+  impl_->choose_explanations(camera, &evaluation);
+  for (CameraState& other : impl_->cameras)
     for (cv::Mat& votes : other.votes) votes *= k_stale_votes;
-  impl_->vote(viewpoint, &watch);
-  impl_->learn(viewpoint, &watch);
+  impl_->collect_votes(evaluation, &camera);
+  impl_->update_models(evaluation, &camera);
   return impl_->count_votes();
 }
 

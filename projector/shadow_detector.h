@@ -64,7 +64,7 @@ class ShadowDetector {
   /// its exposure (8-bit BGR display values of its size; empty: black). Levels become light by the rig's
   /// measured responses, or without them by sRGB (cameras) and gamma 2.2 (projectors). Returns true when a
   /// map has changed. Nothing happens before place().
-  bool see(std::size_t camera, const cv::Mat& frame, std::span<const cv::Mat> shown);
+  bool update_maps(std::size_t camera, const cv::Mat& frame, std::span<const cv::Mat> shown);
 
   /// The share of a projector's light that arrives, over its image: CV_32FC1, 0 … 1, one pixel for each cell.
   /// It rises smoothly to 1 around blocked cells.

@@ -12,14 +12,14 @@ namespace {
 // Texels of the id image for each pixel of the imager, along one axis. More texels find thinner triangles.
 constexpr double k_oversampling = 1.5;
 // Side of the viewer's id image, texels.
-constexpr int k_eye_side = 2560;
+constexpr int k_viewer_ids_side = 2560;
 // Nodes of the pixel maps. A cell is 4 to 5 px wide; interpolation differs from the lens by at most 0.01 px.
 constexpr int k_map_columns = 321, k_map_rows = 241;
 constexpr double k_on_surface = 0.002;  // m, as in shaders/on_surface.glsl
 // Share of the image's smaller side over which a projector fades towards its border.
 constexpr double k_soft_border = 0.1;
 
-Pose sight_pose(const Imager& imager, const Pose& scene_from_world) {
+Pose imager_from_scene(const Imager& imager, const Pose& scene_from_world) {
   return imager.imager_from_world * scene_from_world.inverse();
 }
 
@@ -53,25 +53,25 @@ Eigen::AlignedBox3d box_of(const std::vector<PlacedRun>& runs, bool (*wanted)(co
 TangentRect spanned_behind(const Pose& pinhole_from_scene,
                            const PlacedRun& part,
                            const std::vector<PlacedRun>& runs,
-                           const Eigen::Vector3d& p_eye) {
+                           const Eigen::Vector3d& p_viewer) {
   const std::array<Eigen::Vector3d, 8> corners = bounds_of(part);
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p : corners) middle += p / static_cast<double>(corners.size());
-  const Eigen::Vector3d d = (middle - p_eye).normalized();
+  const Eigen::Vector3d d = (middle - p_viewer).normalized();
   double nearest = 1e9, farthest = 0;
   for (const PlacedRun& run : runs) {
     if (!is_prototype(run)) continue;
     for (const Eigen::Vector3d& p : bounds_of(run)) {
-      nearest = std::min(nearest, d.dot(p - p_eye));
-      farthest = std::max(farthest, d.dot(p - p_eye));
+      nearest = std::min(nearest, d.dot(p - p_viewer));
+      farthest = std::max(farthest, d.dot(p - p_viewer));
     }
   }
   std::array<Eigen::Vector3d, 16> out;
   for (std::size_t k = 0; k < corners.size(); ++k) {
-    const double depth = d.dot(corners[k] - p_eye);
+    const double depth = d.dot(corners[k] - p_viewer);
     if (depth < 0.01 || nearest < 0.01) return spanned_by(pinhole_from_scene, runs, is_prototype);
-    out[2 * k] = p_eye + nearest / depth * (corners[k] - p_eye);
-    out[2 * k + 1] = p_eye + farthest / depth * (corners[k] - p_eye);
+    out[2 * k] = p_viewer + nearest / depth * (corners[k] - p_viewer);
+    out[2 * k + 1] = p_viewer + farthest / depth * (corners[k] - p_viewer);
   }
   return tangents_spanned(pinhole_from_scene, out);
 }
@@ -118,14 +118,15 @@ void GpuLens::bind(const Use& use) const {
 }
 
 struct VisibilityBuffers::GpuViewpoint {
-  Eigen::Matrix4f sight_from_scene;
-  Eigen::Vector4f focal_centre, p_eye, size, map, quality, vignetting, focus;
+  Eigen::Matrix4f pinhole_from_scene;
+  Eigen::Vector4f focal_centre, p_origin, size, map, quality, vignetting, focus;
 
   GpuViewpoint(const PinholeView& pinhole, int first_layer) {
-    sight_from_scene = pinhole.pinhole_from_scene.matrix().cast<float>();
+    pinhole_from_scene = pinhole.pinhole_from_scene.matrix().cast<float>();
     const auto focal = static_cast<float>(pinhole.focal);
     focal_centre << focal, focal, pinhole.centre.cast<float>();
-    p_eye << pinhole.pinhole_from_scene.inverse().translation.cast<float>(), static_cast<float>(first_layer);
+    p_origin << pinhole.pinhole_from_scene.inverse().translation.cast<float>(),
+        static_cast<float>(first_layer);
     size << static_cast<float>(pinhole.width), static_cast<float>(pinhole.height), 0, 0;
     map.setZero();
     quality << focal, 0, 0, 0;
@@ -171,19 +172,20 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
     const Eigen::Vector2d extent =
         k_oversampling * projectors[i].lens.fx() * (lens.baked.rect.upper - lens.baked.rect.lower);
     visibility.ids_width_ =
-        std::clamp(static_cast<int>(extent.x()) + 8, visibility.ids_width_, 2 * k_eye_side);
+        std::clamp(static_cast<int>(extent.x()) + 8, visibility.ids_width_, 2 * k_viewer_ids_side);
     visibility.ids_height_ =
-        std::clamp(static_cast<int>(extent.y()) + 8, visibility.ids_height_, 2 * k_eye_side);
+        std::clamp(static_cast<int>(extent.y()) + 8, visibility.ids_height_, 2 * k_viewer_ids_side);
     visibility.lenses_.push_back(std::move(lens));
   }
   visibility.projector_ids_ =
       make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, visibility.ids_width_, visibility.ids_height_, 2 * count);
   glClearTexImage(*visibility.projector_ids_, 0, GL_RED_INTEGER, GL_UNSIGNED_INT, nullptr);
   visibility.surface_places_.resize(projectors.size());
-  visibility.eye_ids_ = make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_eye_side, k_eye_side, 2);
+  visibility.viewer_ids_ =
+      make_texture(GL_TEXTURE_2D_ARRAY, GL_R32UI, k_viewer_ids_side, k_viewer_ids_side, 2);
   visibility.depth_ =
-      make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_eye_side, visibility.ids_width_),
-                   std::max(k_eye_side, visibility.ids_height_));
+      make_texture(GL_TEXTURE_2D, GL_DEPTH_COMPONENT32F, std::max(k_viewer_ids_side, visibility.ids_width_),
+                   std::max(k_viewer_ids_side, visibility.ids_height_));
   if (projectors.size() > 1) {
     LIMN_TRY(visibility.edge_feathering_,
              EdgeFeathering::create(static_cast<int>(projectors.size()), visibility.ids_width_,
@@ -192,8 +194,8 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
   visibility.framebuffer_ = make_framebuffer();
   glNamedFramebufferTexture(*visibility.framebuffer_, GL_DEPTH_ATTACHMENT, *visibility.depth_, 0);
   const std::vector<std::byte> empty((projectors.size() + 2) * sizeof(GpuViewpoint));
-  visibility.visibility_ = make_buffer(empty.data(), empty.size());
-  visibility.sight_texels_ = make_texels(visibility.visibility_, GL_RGBA32F);
+  visibility.viewpoints_ = make_buffer(empty.data(), empty.size());
+  visibility.viewpoint_texels_ = make_texels(visibility.viewpoints_, GL_RGBA32F);
   return visibility;
 }
 
@@ -227,8 +229,8 @@ void VisibilityBuffers::draw(const GpuScene& scene,
   };
   for (const PlacedRun& placed : runs) {
     if (!wanted(placed)) continue;
-    const Pose twin_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
-    const Eigen::Matrix4d clip_from_owner = clip_from_pinhole(pinhole) * twin_from_owner.matrix();
+    const Pose pinhole_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
+    const Eigen::Matrix4d clip_from_owner = clip_from_pinhole(pinhole) * pinhole_from_owner.matrix();
     const Program& program = placed.run->has_cut_outs ? cut_program_ : program_;
     scene.bind({Resource::scene, GL_READ_ONLY, program});
     program.use();
@@ -238,7 +240,8 @@ void VisibilityBuffers::draw(const GpuScene& scene,
     // Consecutive visible clusters are drawn in one call.
     int first = placed.run->first, count = 0;
     for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
-      if (intersected(rect, tangents_spanned(twin_from_owner, corners_of(cluster.box))).is_empty()) continue;
+      if (intersected(rect, tangents_spanned(pinhole_from_owner, corners_of(cluster.box))).is_empty())
+        continue;
       if (cluster.first != first + count) {
         draw_triangles(first, count);
         first = cluster.first;
@@ -253,7 +256,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
 }
 
 void VisibilityBuffers::send(int index, const GpuViewpoint& viewpoint) {
-  glNamedBufferSubData(*visibility_, static_cast<GLintptr>(sizeof(GpuViewpoint)) * index,
+  glNamedBufferSubData(*viewpoints_, static_cast<GLintptr>(sizeof(GpuViewpoint)) * index,
                        sizeof(GpuViewpoint), &viewpoint);
 }
 
@@ -266,7 +269,7 @@ void VisibilityBuffers::upload_pixel_map(int layer, const Imager& imager, const 
 PinholeView VisibilityBuffers::projector_pinhole_view(std::size_t projector,
                                                       const std::vector<PlacedRun>& runs,
                                                       const Pose& scene_from_world) const {
-  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  const Pose pose = imager_from_scene(projectors_[projector], scene_from_world);
   return pinhole_view_over(pose,
                            intersected(lenses_[projector].baked.rect, spanned_by(pose, runs, is_prototype)),
                            k_oversampling * projectors_[projector].lens.fx(), ids_width_, ids_height_);
@@ -280,7 +283,8 @@ void VisibilityBuffers::draw_prototype_from_projectors(const GpuScene& scene,
     const PinholeView pinhole = projector_pinhole_view(i, runs, scene_from_world);
     const int layer = 2 * static_cast<int>(i);
     draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), projector_ids_, layer);
-    if (with_soft_edges && edge_feathering_) edge_feathering_->find(static_cast<int>(i), depth_, pinhole);
+    if (with_soft_edges && edge_feathering_)
+      edge_feathering_->find_edges(static_cast<int>(i), depth_, pinhole);
     GpuViewpoint viewpoint(pinhole, layer);
     viewpoint.of_imager(projectors_[i]);
     viewpoint.with_map(lenses_[i].baked.rect, static_cast<int>(i));
@@ -315,15 +319,15 @@ void VisibilityBuffers::draw_from_imager(const GpuScene& scene,
                                          const Imager& imager,
                                          const BakedLens& lens,
                                          bool parts_alone) {
-  const Pose pose = sight_pose(imager, scene_from_world);
+  const Pose pose = imager_from_scene(imager, scene_from_world);
   const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, parts_alone ? is_part : is_any));
   const PinholeView pinhole =
-      pinhole_view_over(pose, rect, k_oversampling * imager.lens.fx(), k_eye_side, k_eye_side);
-  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), eye_ids_, 0);
-  draw(scene, runs, is_part, pinhole, whole_of(pinhole), eye_ids_, 1);
+      pinhole_view_over(pose, rect, k_oversampling * imager.lens.fx(), k_viewer_ids_side, k_viewer_ids_side);
+  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), viewer_ids_, 0);
+  draw(scene, runs, is_part, pinhole, whole_of(pinhole), viewer_ids_, 1);
   GpuViewpoint viewpoint(pinhole, 0);
   viewpoint.of_imager(imager);
-  send(eye(), viewpoint);
+  send(viewer(), viewpoint);
 }
 
 void VisibilityBuffers::draw_from_reference_camera(const GpuScene& scene,
@@ -331,47 +335,48 @@ void VisibilityBuffers::draw_from_reference_camera(const GpuScene& scene,
                                                    const Pose& scene_from_world,
                                                    const Imager& camera,
                                                    const BakedLens& lens) {
-  const Pose pose = sight_pose(camera, scene_from_world);
+  const Pose pose = imager_from_scene(camera, scene_from_world);
   const PinholeView pinhole =
       pinhole_view_over(pose, intersected(lens.rect, spanned_by(pose, runs, is_prototype)),
                         k_oversampling * camera.lens.fx(), ids_width_, ids_height_);
-  const int layer = 2 * eye();
+  const int layer = 2 * viewer();
   draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), projector_ids_, layer);
-  upload_pixel_map(eye(), camera, lens.rect);
+  upload_pixel_map(viewer(), camera, lens.rect);
   GpuViewpoint viewpoint(pinhole, layer);
   viewpoint.of_imager(camera);
-  viewpoint.with_map(lens.rect, eye());
+  viewpoint.with_map(lens.rect, viewer());
   send(reference_camera(), viewpoint);
 }
 
-void VisibilityBuffers::draw_from_eye(const GpuScene& scene,
-                                      const std::vector<PlacedRun>& runs,
-                                      const Pose& scene_from_world,
-                                      const Eigen::Vector3d& p_eye_scene,
-                                      const Eigen::Vector3d& d_up_scene) {
+void VisibilityBuffers::draw_from_viewer(const GpuScene& scene,
+                                         const std::vector<PlacedRun>& runs,
+                                         const Pose& scene_from_world,
+                                         const Eigen::Vector3d& p_viewer_scene,
+                                         const Eigen::Vector3d& d_up_scene) {
   const Eigen::AlignedBox3d box = box_of(runs, is_view_part);
-  const Pose pose = box.isEmpty() ? Pose() : looking_at(p_eye_scene, box.center(), d_up_scene);
+  const Pose pose = box.isEmpty() ? Pose() : looking_at(p_viewer_scene, box.center(), d_up_scene);
   const Eigen::AlignedBox3d prototype = box_of(runs, is_prototype);
   double focal = 1;
   for (const Imager& projector : projectors_) {
-    const Eigen::Vector3d p_projector = (sight_pose(projector, scene_from_world).inverse()).translation;
+    const Eigen::Vector3d p_projector =
+        (imager_from_scene(projector, scene_from_world).inverse()).translation;
     const double distance = prototype.isEmpty() ? 1 : std::max(0.05, prototype.exteriorDistance(p_projector));
-    const double farthest =
-        prototype.isEmpty() ? 1
-                            : (prototype.center() - p_eye_scene).norm() + 0.5 * prototype.diagonal().norm();
+    const double farthest = prototype.isEmpty() ? 1
+                                                : (prototype.center() - p_viewer_scene).norm() +
+                                                      0.5 * prototype.diagonal().norm();
     focal = std::max(focal, k_oversampling * projector.lens.fx() * farthest / distance);
   }
-  const PinholeView pinhole =
-      pinhole_view_over(pose, spanned_by(pose, runs, is_view_part), focal, k_eye_side, k_eye_side);
-  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), eye_ids_, 0);
-  draw(scene, runs, is_part, pinhole, whole_of(pinhole), eye_ids_, 1);
-  send(eye(), GpuViewpoint(pinhole, 0));
+  const PinholeView pinhole = pinhole_view_over(pose, spanned_by(pose, runs, is_view_part), focal,
+                                                k_viewer_ids_side, k_viewer_ids_side);
+  draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), viewer_ids_, 0);
+  draw(scene, runs, is_part, pinhole, whole_of(pinhole), viewer_ids_, 1);
+  send(viewer(), GpuViewpoint(pinhole, 0));
 }
 
 cv::Rect VisibilityBuffers::prototype_rect(std::size_t projector,
                                            const std::vector<PlacedRun>& runs,
                                            const Pose& scene_from_world) const {
-  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+  const Pose pose = imager_from_scene(projectors_[projector], scene_from_world);
   return pixels_of(projectors_[projector], lenses_[projector].baked, spanned_by(pose, runs, is_prototype));
 }
 
@@ -381,7 +386,7 @@ std::vector<cv::Rect> VisibilityBuffers::visible_rects(const Imager& imager,
                                                        const Pose& scene_from_world,
                                                        bool prototype_too,
                                                        double around_m) const {
-  const Pose pose = sight_pose(imager, scene_from_world);
+  const Pose pose = imager_from_scene(imager, scene_from_world);
   std::vector<cv::Rect> places;
   for (const PlacedRun& run : runs) {
     if (!prototype_too && is_prototype(run)) continue;
@@ -391,34 +396,34 @@ std::vector<cv::Rect> VisibilityBuffers::visible_rects(const Imager& imager,
   return places;
 }
 
-void VisibilityBuffers::lit_rects(std::size_t projector,
-                                  const std::vector<PlacedRun>& runs,
-                                  const Pose& scene_from_world,
-                                  const Eigen::Vector3d& p_eye_scene,
-                                  std::vector<cv::Rect>* of_view,
-                                  std::vector<cv::Rect>* of_surface) const {
-  const Pose pose = sight_pose(projectors_[projector], scene_from_world);
+void VisibilityBuffers::light_rects(std::size_t projector,
+                                    const std::vector<PlacedRun>& runs,
+                                    const Pose& scene_from_world,
+                                    const Eigen::Vector3d& p_viewer_scene,
+                                    std::vector<cv::Rect>* of_view,
+                                    std::vector<cv::Rect>* of_surface) const {
+  const Pose pose = imager_from_scene(projectors_[projector], scene_from_world);
   const cv::Rect whole = prototype_rect(projector, runs, scene_from_world);
   of_view->clear();
   of_surface->clear();
   for (const PlacedRun& part : runs) {
     if (!is_part(part)) continue;
     const TangentRect rect = part.on_surface ? tangents_spanned(pose, bounds_of(part, k_on_surface))
-                                             : spanned_behind(pose, part, runs, p_eye_scene);
+                                             : spanned_behind(pose, part, runs, p_viewer_scene);
     const cv::Rect place = whole & pixels_of(projectors_[projector], lenses_[projector].baked, rect);
     if (!place.empty()) (part.on_surface ? of_surface : of_view)->push_back(place);
   }
 }
 
 void VisibilityBuffers::bind(const Use& use) const {
-  glBindTextureUnit(k_viewpoints_unit, *sight_texels_);
+  glBindTextureUnit(k_viewpoints_unit, *viewpoint_texels_);
   glBindTextureUnit(k_projector_ids_unit, *projector_ids_);
-  glBindTextureUnit(k_eye_ids_unit, *eye_ids_);
+  glBindTextureUnit(k_viewer_ids_unit, *viewer_ids_);
   glBindTextureUnit(k_pixel_maps_unit, *pixel_maps_);
   if (edge_feathering_) glBindTextureUnit(k_edge_fade_unit, *edge_feathering_->fade());
   use.program.set("u_projector_count", static_cast<int>(projectors_.size()));
-  use.program.set("u_eye", eye());
-  use.program.set("u_witness", reference_camera());
+  use.program.set("u_viewer", viewer());
+  use.program.set("u_reference_camera", reference_camera());
 }
 
 }  // namespace limn::projector

@@ -52,20 +52,20 @@ class VisibilityBuffers final : public Bindable {
                         bool parts_alone);
   /// Draws the ids from a viewer's position, over its view parts, at the resolution at which the projectors
   /// show them. `d_up_scene` is any direction that is not parallel to the viewing direction.
-  void draw_from_eye(const GpuScene& scene,
-                     const std::vector<PlacedRun>& runs,
-                     const Pose& scene_from_world,
-                     const Eigen::Vector3d& p_eye_scene,
-                     const Eigen::Vector3d& d_up_scene);
+  void draw_from_viewer(const GpuScene& scene,
+                        const std::vector<PlacedRun>& runs,
+                        const Pose& scene_from_world,
+                        const Eigen::Vector3d& p_viewer_scene,
+                        const Eigen::Vector3d& d_up_scene);
 
   /// Rectangles of the projector's image, outside of which it gives no light for the parts. There is one for
   /// each part: where the viewer sees the prototype behind it, or where it lies on the surface.
-  void lit_rects(std::size_t projector,
-                 const std::vector<PlacedRun>& runs,
-                 const Pose& scene_from_world,
-                 const Eigen::Vector3d& p_eye_scene,
-                 std::vector<cv::Rect>* of_view,
-                 std::vector<cv::Rect>* of_surface) const;
+  void light_rects(std::size_t projector,
+                   const std::vector<PlacedRun>& runs,
+                   const Pose& scene_from_world,
+                   const Eigen::Vector3d& p_viewer_scene,
+                   std::vector<cv::Rect>* of_view,
+                   std::vector<cv::Rect>* of_surface) const;
   /// Rectangles of an imager's image, outside of which it sees no part, nor anything within `around_m` of
   /// one. `prototype_too` adds the prototype.
   std::vector<cv::Rect> visible_rects(const Imager& imager,
@@ -89,8 +89,8 @@ class VisibilityBuffers final : public Bindable {
 
   const GpuLens& projector_lens(std::size_t i) const { return lenses_[i]; }
   /// Index of the viewer among the viewpoints in the shaders.
-  int eye() const { return static_cast<int>(projectors_.size()); }
-  int reference_camera() const { return eye() + 1; }
+  int viewer() const { return static_cast<int>(projectors_.size()); }
+  int reference_camera() const { return viewer() + 1; }
   /// Binds Resource::viewpoints.
   void bind(const Use& use) const override;
 
@@ -115,7 +115,7 @@ class VisibilityBuffers final : public Bindable {
   std::vector<GpuLens> lenses_;
   Program program_, cut_program_;  // for whole triangles, and for triangles with an alpha cutoff
   std::optional<EdgeFeathering> edge_feathering_;  // only with several projectors
-  GlName framebuffer_, depth_, projector_ids_, eye_ids_, pixel_maps_, visibility_, sight_texels_;
+  GlName framebuffer_, depth_, projector_ids_, viewer_ids_, pixel_maps_, viewpoints_, viewpoint_texels_;
   int ids_width_ = 1, ids_height_ = 1;    // size of the texture of the projectors' ids
   std::vector<cv::Rect> surface_places_;  // texels of each projector's ids that may contain surface parts
 };

@@ -16,7 +16,7 @@ constexpr double k_holds_s = 3;          // how long a finding must hold before 
 constexpr double k_paper = 1.8;          // side of the area that is left out around a marker, in marker sides
 constexpr double k_least_px = 1.5;       // smaller displacements do not matter
 constexpr double k_least_contrast = 0.3;
-constexpr double k_least_likeness = 0.3;
+constexpr double k_least_correlation = 0.3;
 // Share of what the calibrated poses do not explain that the motion of a device must explain.
 constexpr double k_least_gain = 0.1;
 constexpr double k_as_good = 0.92;  // devices with this share of the best gain explain it equally well
@@ -79,7 +79,7 @@ void DriftWatch::compare(const Percepts& percepts,
       lights_[i].place(renderer->illuminated_patches(i, posed, lights_[i].side_px()));
   }
   projector::MisalignmentDetector& light = lights_[turn_];
-  if (light.is_looking()) {
+  if (light.is_comparing()) {
     const double passed_s = std::clamp(seconds_between(compared_at_, at), 0.0, k_look_s);
     compared_at_ = at;
     if (light.compare(1 + static_cast<int>(k_cells_a_second * passed_s))) settle(judged(), at);
@@ -101,13 +101,13 @@ void DriftWatch::compare(const Percepts& percepts,
 std::optional<Drift> DriftWatch::judged() const {
   struct Candidate {
     std::string device;
-    double gain = 0, contrast = 0, likeness = 0, as_foretold = 0, px = 0, mm = 0;
+    double gain = 0, contrast = 0, correlation = 0, unshifted_correlation = 0, px = 0, mm = 0;
 
     void add(const projector::Displacement& moved, double mm_per_px) {
       gain += moved.gain;
       contrast += moved.contrast;
-      likeness += moved.contrast * moved.likeness;
-      as_foretold += moved.contrast * moved.as_foretold;
+      correlation += moved.contrast * moved.correlation;
+      unshifted_correlation += moved.contrast * moved.unshifted_correlation;
       if (moved.px.norm() <= px) return;
       px = moved.px.norm();
       mm = mm_per_px * px;
@@ -116,7 +116,7 @@ std::optional<Drift> DriftWatch::judged() const {
   std::vector<Candidate> candidates;
   for (const Imager& projector : rig_.projectors) candidates.push_back({projector.name});
   for (std::size_t i = 0; i < lights_.size(); ++i) {
-    const projector::LightDisplacements places = lights_[i].places();
+    const projector::LightDisplacements places = lights_[i].displacements();
     for (std::size_t k = 0; k < places.projectors.size(); ++k)
       candidates[k].add(places.projectors[k], places.mm_per_px);
     candidates.push_back({rig_.cameras[i].name});
@@ -125,8 +125,9 @@ std::optional<Drift> DriftWatch::judged() const {
   std::sort(candidates.begin(), candidates.end(),
             [](const Candidate& a, const Candidate& b) { return a.gain > b.gain; });
   const Candidate& best = candidates.front();
-  if (best.contrast < k_least_contrast || best.likeness < k_least_likeness * best.contrast ||
-      best.likeness - best.as_foretold < k_least_gain * (best.contrast - best.as_foretold) ||
+  if (best.contrast < k_least_contrast || best.correlation < k_least_correlation * best.contrast ||
+      best.correlation - best.unshifted_correlation <
+          k_least_gain * (best.contrast - best.unshifted_correlation) ||
       best.px < k_least_px)
     return std::nullopt;
   Drift drift{{}, best.px, best.mm};

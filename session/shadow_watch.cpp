@@ -29,7 +29,7 @@ void ShadowWatch::update(const Percepts& percepts,
     if (frame.image.empty() || frame.captured_at <= seen_at_[i]) continue;
     seen_at_[i] = frame.captured_at;
     if (const auto* images = shown.at(frame.captured_at))
-      has_changed |= arriving_.see(i, frame.image, *images);
+      has_changed |= arriving_.update_maps(i, frame.image, *images);
   }
   if (!has_changed) return;
   for (std::size_t i = 0; i < rig_.projectors.size(); ++i) renderer->set_occlusion(i, arriving_.map(i));

@@ -2,14 +2,14 @@
 // vignetting and the surface's colour is divided out (projector/compensation.h).
 #include "bindings.glsl"
 
-const int k_as_it_is = 0;  // Compensation::none. Other values: by geometry or, if BY_MEASUREMENT is defined,
-                           // by measurement.
+// Compensation::none. Other values: by geometry or, if BY_MEASUREMENT is defined, by measurement.
+const int k_uncompensated = 0;
 uniform int u_compensation;
 uniform float u_level;      // irradiance (1/m^2) on the mean surface that a colour of 1 stands for
 uniform bool u_even_black;  // adds the black level of projectors that do not reach a point
 uniform mat3 u_mean_mixing;
 #ifdef BY_MEASUREMENT
-uniform int u_witness;  // index of the reference camera's viewpoint
+uniform int u_reference_camera;  // index of the reference camera's viewpoint
 // Layer 3 i + c: the colour that the camera sees when channel c of projector i gives an irradiance of 1; a is
 // 0 where it is unknown. The last layer: the colour without projectors.
 layout(binding = k_colour_mixing_unit) uniform sampler2DArray s_mixing;
@@ -37,10 +37,10 @@ vec4 mixing_at(vec2 px, int layer) {
 // As measured with projector i; where that is unknown, with another projector; else the mean.
 Surface surface_at(int i, vec3 p, Hit prototype) {
   Surface surface = Surface(u_mean_mixing, vec3(0));
-  Sight witness = sight_at(u_witness);
-  vec3 q = (witness.sight_from_scene * vec4(p, 1)).xyz;
-  if (q.z <= 0.0 || is_hidden(s_projector_ids, witness, p)) return surface;
-  vec2 px = pixel_of(witness, q.xy / q.z);
+  Viewpoint reference_camera = viewpoint_at(u_reference_camera);
+  vec3 q = (reference_camera.pinhole_from_scene * vec4(p, 1)).xyz;
+  if (q.z <= 0.0 || is_hidden(s_projector_ids, reference_camera, p)) return surface;
+  vec2 px = pixel_of(reference_camera, q.xy / q.z);
   surface.offset = mixing_at(px, 3 * u_projector_count).rgb;
   for (int k = 0; k < u_projector_count; ++k) {
     int j = (i + k) % u_projector_count;
@@ -65,11 +65,11 @@ Surface surface_at(int i, vec3 p, Hit prototype) {
 // Light above its black level that projector i should give at a place of the prototype, where it has `share`.
 // The result is outside 0 to 1 where the projector cannot give it. `colour`.a is 0 where no part is shown.
 vec3 balanced(int i, vec4 colour, Share share, Place place, Hit prototype) {
-  if (u_compensation == k_as_it_is && !u_even_black) return colour.rgb * share.share;
+  if (u_compensation == k_uncompensated && !u_even_black) return colour.rgb * share.share;
   if (share.share == 0.0) return vec3(0);
   vec3 light = vec3(0);
   if (colour.a > 0.0) {
-    if (u_compensation == k_as_it_is) {
+    if (u_compensation == k_uncompensated) {
       light = colour.rgb * share.share;
     } else {
       Surface surface = surface_at(i, place.p, prototype);

@@ -4,12 +4,12 @@
 // pixel lights no point.
 #include "scene.glsl"
 #include "lens.glsl"
-#include "reach.glsl"
+#include "projector_blending.glsl"
 layout(location = 0) out vec2 o_blend;
 uniform int u_projector;
 
 void main() {
-  Sight projector = sight_at(u_projector);
+  Viewpoint projector = viewpoint_at(u_projector);
   vec3 d = ray_of(projector, floor(gl_FragCoord.xy));
   Hit hit = first_hit(s_projector_ids, projector, 0, d);
   o_blend = vec2(0);

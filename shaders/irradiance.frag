@@ -4,17 +4,17 @@
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
-#include "reach.glsl"
+#include "projector_blending.glsl"
 layout(location = 0) out float o_irradiance;
-layout(binding = k_eye_ids_unit) uniform usampler2DArray s_eye_ids;
-uniform int u_eye, u_projector;
+layout(binding = k_viewer_ids_unit) uniform usampler2DArray s_viewer_ids;
+uniform int u_viewer, u_projector;
 
 void main() {
-  Sight eye = sight_at(u_eye);
-  vec3 d = ray_of(eye, floor(gl_FragCoord.xy));
-  Hit hit = first_hit(s_eye_ids, eye, 0, d);
+  Viewpoint viewer = viewpoint_at(u_viewer);
+  vec3 d = ray_of(viewer, floor(gl_FragCoord.xy));
+  Hit hit = first_hit(s_viewer_ids, viewer, 0, d);
   o_irradiance = 0.0;
   if (hit.id == 0u) return;
-  Reach reach = reach(u_projector, place_at(hit, d), false);
-  if (reach.quality > 0.0) o_irradiance = reach.irradiance;
+  Illumination illumination = illumination_from(u_projector, place_at(hit, d), false);
+  if (illumination.quality > 0.0) o_irradiance = illumination.irradiance;
 }

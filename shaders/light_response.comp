@@ -3,10 +3,10 @@
 // it was clipped.
 #include "bindings.glsl"
 #include "scene.glsl"
-#include "listed.glsl"
+#include "work_list.glsl"
 layout(local_size_x = 64) in;
 layout(rgba8, binding = k_target_image) uniform writeonly image2D u_display;
-layout(binding = k_light_unit) uniform sampler2D s_centre;  // linear light, a: coverage
+layout(binding = k_light_unit) uniform sampler2D s_light;  // linear light, a: coverage
 // Display value as a function of the square root of light, evenly spaced from 0 to 1.
 layout(binding = k_response_unit) uniform sampler2D s_response;
 uniform int u_projector;
@@ -30,15 +30,15 @@ vec3 display_value(vec3 light) {
 }
 
 void main() {
-  if (!is_listed()) return;
-  ivec2 at = listed_pixel();
-  vec4 light = texelFetch(s_centre, at, 0);
+  if (!has_work()) return;
+  ivec2 at = work_pixel();
+  vec4 light = texelFetch(s_light, at, 0);
   // 1: the wanted light is brighter than possible, 0.5: darker than possible.
   const float k_tolerance = 0.004;
   float clipped = any(greaterThan(light.rgb, vec3(1.0 + k_tolerance))) ? 1.0
                   : any(lessThan(light.rgb, vec3(-k_tolerance)))       ? 0.5
                                                                        : 0.0;
-  float black = u_is_balanced ? sight_at(u_projector).quality.w : 0.0;
+  float black = u_is_balanced ? viewpoint_at(u_projector).quality.w : 0.0;
   vec3 value = light.a > 0.0 ? display_value(black + (1.0 - black) * light.rgb) : vec3(0);
   if (u_is_balanced) {
     // Dithering avoids bands of whole levels in smooth light. Full black and full white are not changed.

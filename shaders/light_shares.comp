@@ -3,17 +3,17 @@
 // replaces it by the light.
 #include "bindings.glsl"
 #include "light.glsl"
-#include "listed.glsl"
+#include "work_list.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = k_target_image) uniform image2D u_image;
 
 void main() {
-  if (!is_listed()) return;
-  ivec2 at = listed_pixel();
-  Hit prototype = known_hit(at);
+  if (!has_work()) return;
+  ivec2 at = work_pixel();
+  Hit prototype = cached_hit(at);
   if (prototype.id == 0u) return;
-  Place place = place_at(prototype, ray_of(sight_at(u_projector), vec2(at)));
-  Share share = learn_share(at, place);
+  Place place = place_at(prototype, ray_of(viewpoint_at(u_projector), vec2(at)));
+  Share share = cache_share(at, place);
   vec4 colour = imageLoad(u_image, at);
   if (colour.a > 0.0 || u_even_black)
     imageStore(u_image, at, vec4(balanced(u_projector, colour, share, place, prototype), 1));

@@ -2,11 +2,11 @@
 // because software GL would execute the code even if it is not needed.
 #include "bindings.glsl"
 
-struct Finish {
+struct SurfaceMaterial {
   vec3 base;                // linear
   float metallic, roughness;
-  bool is_plain;            // purely diffuse
-  float open;               // share of soft light that arrives (occlusion map)
+  bool is_diffuse;          // purely diffuse
+  float occlusion;          // share of soft light that arrives (occlusion map)
   vec3 emitted;             // emitted light
   vec3 n_smooth, n;         // unit normals in the scene's frame: interpolated, and with the normal map; not
                             // yet turned to the viewer
@@ -17,13 +17,15 @@ vec3 base_colour(Hit hit, float footprint) {
   Material material = s_materials[material_of(hit.id)];
   vec4 wanted = owner_at(owner_of(hit.id)).colour;
   vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
-  if (material.look.x < 0.0) return colour;
+  if (material.parameters.x < 0.0) return colour;
   vec2 uv = uv_of(hit);
-  return colour * textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, material.look.x), texture_lod(hit, footprint)).rgb;
+  vec3 at = vec3(uv.x, 1.0 - uv.y, material.parameters.x);
+  return colour * textureLod(s_colour_maps, at, texture_lod(hit, footprint)).rgb;
 }
 
 bool is_unlit(Hit hit) {
-  return s_materials[material_of(hit.id)].colour.a > 0.5 && all(lessThan(owner_at(owner_of(hit.id)).look.xy, vec2(0)));
+  return s_materials[material_of(hit.id)].colour.a > 0.5 &&
+         all(lessThan(owner_at(owner_of(hit.id)).metallic_roughness.xy, vec2(0)));
 }
 
 #ifdef SURFACE_MAPS
@@ -45,37 +47,39 @@ vec3 mapped_normal_in_owner(Hit hit, vec3 n, Material material, float footprint)
   return normalize(along.x * d_u + along.y * d_v + along.z * n);
 }
 
-void read_maps(Hit hit, Material material, float footprint, inout Finish finish) {
-  finish.emitted = material.emitted.rgb;
+void read_maps(Hit hit, Material material, float footprint, inout SurfaceMaterial surface) {
+  surface.emitted = material.emitted.rgb;
   vec2 uv = uv_of(hit);
   if (material.emitted.a >= 0.0)
-    finish.emitted *= textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, material.emitted.a), texture_lod(hit, footprint)).rgb;
+    surface.emitted *=
+        textureLod(s_colour_maps, vec3(uv.x, 1.0 - uv.y, material.emitted.a), texture_lod(hit, footprint)).rgb;
   if (material.maps.x >= 0.0) {
     vec3 map = map_at(hit, footprint, material.maps.x);
-    finish.open = 1.0 + material.maps.w * (map.r - 1.0);
-    finish.roughness *= map.g;
-    finish.metallic *= map.b;
-    finish.is_plain = material.more.y == 0;
+    surface.occlusion = 1.0 + material.maps.w * (map.r - 1.0);
+    surface.roughness *= map.g;
+    surface.metallic *= map.b;
+    surface.is_diffuse = material.more.y == 0;
   }
   if (material.maps.y >= 0.0) {
     vec3 n = mapped_normal_in_owner(hit, smooth_normal_in_owner(hit), material, footprint);
-    finish.n = turned_to_scene(owner_of(hit.id), n);
+    surface.n = turned_to_scene(owner_of(hit.id), n);
   }
 }
 #else
-void read_maps(Hit hit, Material material, float footprint, inout Finish finish) {}
+void read_maps(Hit hit, Material material, float footprint, inout SurfaceMaterial surface) {}
 #endif
 
-// The finish of a material that is not unlit. An override of metalness or roughness applies to the whole part
-// and replaces the maps.
-Finish finish_at(Hit hit, float footprint) {
+// The surface material of a hit that is not unlit. An override of metalness or roughness applies to the whole
+// part and replaces the maps.
+SurfaceMaterial surface_material_at(Hit hit, float footprint) {
   Material material = s_materials[material_of(hit.id)];
-  vec2 wanted = owner_at(owner_of(hit.id)).look.xy;
+  vec2 wanted = owner_at(owner_of(hit.id)).metallic_roughness.xy;
   vec3 n = smooth_normal(hit);
-  Finish finish = Finish(base_colour(hit, footprint), material.look.y, material.look.z, true, 1.0, vec3(0), n, n);
-  read_maps(hit, material, footprint, finish);
-  if (wanted.x >= 0.0) finish.metallic = wanted.x;
-  if (wanted.y >= 0.0) finish.roughness = wanted.y;
-  finish.is_plain = finish.is_plain && finish.metallic == 0.0 && finish.roughness == 1.0;
-  return finish;
+  SurfaceMaterial surface = SurfaceMaterial(base_colour(hit, footprint), material.parameters.y,
+                                            material.parameters.z, true, 1.0, vec3(0), n, n);
+  read_maps(hit, material, footprint, surface);
+  if (wanted.x >= 0.0) surface.metallic = wanted.x;
+  if (wanted.y >= 0.0) surface.roughness = wanted.y;
+  surface.is_diffuse = surface.is_diffuse && surface.metallic == 0.0 && surface.roughness == 1.0;
+  return surface;
 }

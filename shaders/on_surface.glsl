@@ -18,7 +18,7 @@ bool may_hold_surface_part(vec3 p, int placement_count) {
 // normal line with a triangle within 2 mm. Only triangles in the projector's id image around the line are
 // tested. In the middle of a part, where many triangles meet in a corner, rounding may miss all of them; then
 // the one missed by least is used.
-Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
+Hit surface_part_at(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p, vec3 d_normal) {
   const float k_heights[5] = float[](0.0, 0.5, -0.5, 1.0, -1.0);
   Hit best = k_no_hit, missed = k_no_hit;
   float missed_by = 0.5;  // as a fraction of a triangle's height
@@ -27,7 +27,8 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
   int height = 0;
   do {
     vec4 share;
-    uvec4 ids = ids_around(s_ids, sight, 1, p + k_heights[height] * k_on_surface * d_normal - sight.p_eye.xyz, share);
+    vec3 d = p + k_heights[height] * k_on_surface * d_normal - viewpoint.p_origin.xyz;
+    uvec4 ids = ids_around(s_ids, viewpoint, 1, d, share);
     if (height == 0) in_middle = all(notEqual(ids, uvec4(0)));
     for (int k = 0; k < 4; ++k)
       if (any(equal(tried, uvec4(ids[k])))) ids[k] = 0u;
@@ -45,7 +46,7 @@ Hit surface_part_at(usampler2DArray s_ids, Sight sight, vec3 p, vec3 d_normal) {
           missed = hit;
           missed_by = outside;
         }
-      } else if (is_cut_out(hit, distance(p, sight.p_eye.xyz) / sight.focal_centre.x)) {
+      } else if (is_cut_out(hit, distance(p, viewpoint.p_origin.xyz) / viewpoint.focal_centre.x)) {
         is_through = true;
       } else if (abs(hit.t) < abs(best.t)) {
         best = hit;

@@ -1,35 +1,36 @@
 // The parts as a camera sees them, in linear light; a: coverage. What projected light cannot show is drawn
 // fully, the rest with the part's weight. A contact shadow has coverage but no light.
-#include "seen.glsl"
+#include "part_coverage.glsl"
 #include "contact.glsl"
-uniform uint u_whole[64];  // weights of what projected light can show: one byte for each owner, 255 is all
+// Weights of what projected light can show: one byte for each owner, 255 is all.
+uniform uint u_composite_weights[64];
 
-float whole_share(uint owner) {
-  return owner < 256u ? float(u_whole[owner / 4u] >> (owner % 4u * 8u) & 255u) / 255.0 : 0.0;
+float full_weight(uint owner) {
+  return owner < 256u ? float(u_composite_weights[owner / 4u] >> (owner % 4u * 8u) & 255u) / 255.0 : 0.0;
 }
 
 vec4 shadow_at(vec3 d) {
-  Sight eye = sight_at(u_eye);
-  Hit prototype = first_hit(s_eye_ids, eye, 0, d);
+  Viewpoint viewer = viewpoint_at(u_viewer);
+  Hit prototype = first_hit(s_viewer_ids, viewer, 0, d);
   if (prototype.id == 0u) return vec4(0);
-  return vec4(0, 0, 0, contact_shadow(eye.p_eye.xyz + prototype.t * d, facing_normal(prototype, d)));
+  return vec4(0, 0, 0, contact_shadow(viewer.p_origin.xyz + prototype.t * d, facing_normal(prototype, d)));
 }
 
 // Whether a part at px must be shown by the screen.
 bool is_left_to_screen(vec2 px) {
-  Seen seen = in_sight_at(px);
-  return seen.how == k_screen || (seen.how == k_if_reached && !is_reached(seen.behind));
+  VisiblePart visible = visible_part_at(px);
+  return visible.shown_by == k_screen || (visible.shown_by == k_if_reached && !is_reached(visible.behind));
 }
 
-// `whole`: also draws what light can show.
-vec4 part_seen(Seen seen, bool whole) {
-  if (seen.how == k_nothing) return k_contact_shadow ? shadow_at(seen.d) : vec4(0);
-  float share = seen.how == k_if_reached && !whole ? whole_share(owner_of(seen.part.id)) : 1.0;
-  if (share < 1.0 && !is_reached(seen.behind)) share = 1.0;
+// `is_full`: also draws what light can show.
+vec4 composite_light(VisiblePart visible, bool is_full) {
+  if (visible.shown_by == k_nothing) return k_contact_shadow ? shadow_at(visible.d) : vec4(0);
+  float share = visible.shown_by == k_if_reached && !is_full ? full_weight(owner_of(visible.part.id)) : 1.0;
+  if (share < 1.0 && !is_reached(visible.behind)) share = 1.0;
   if (share == 0.0) return vec4(0);
-  float footprint = seen.part.t / sight_at(u_eye).quality.x;
-  if (owner_at(owner_of(seen.part.id)).upper.w > 0.5) {  // shaded as the projectors show it
-    return share * vec4(radiance_on_surface(seen.part, smooth_normal(seen.part), footprint), 1);
+  float footprint = visible.part.t / viewpoint_at(u_viewer).quality.x;
+  if (owner_at(owner_of(visible.part.id)).upper.w > 0.5) {  // shaded as the projectors show it
+    return share * vec4(radiance_on_surface(visible.part, smooth_normal(visible.part), footprint), 1);
   }
-  return share * vec4(look_along(seen.d, seen.part, footprint), 1);
+  return share * vec4(radiance_along(visible.d, visible.part, footprint), 1);
 }

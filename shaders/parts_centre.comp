@@ -2,12 +2,12 @@
 // Draws a composite: one sample at the centre of each listed pixel.
 #include "bindings.glsl"
 #include "parts.glsl"
-#include "listed.glsl"
+#include "work_list.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
-  if (!is_listed()) return;
-  ivec2 at = listed_pixel();
-  imageStore(u_image, at, part_seen(in_sight_at(vec2(at)), false));
+  if (!has_work()) return;
+  ivec2 at = work_pixel();
+  imageStore(u_image, at, composite_light(visible_part_at(vec2(at)), false));
 }

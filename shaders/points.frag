@@ -8,8 +8,8 @@ layout(binding = k_projector_ids_unit) uniform usampler2DArray s_projector_ids;
 uniform int u_projector;
 
 void main() {
-  Sight projector = sight_at(u_projector);
+  Viewpoint projector = viewpoint_at(u_projector);
   vec3 d = ray_of(projector, floor(gl_FragCoord.xy));
   Hit hit = first_hit(s_projector_ids, projector, 0, d);
-  o_point = hit.id == 0u ? vec4(0) : vec4(projector.p_eye.xyz + hit.t * d, 1);
+  o_point = hit.id == 0u ? vec4(0) : vec4(projector.p_origin.xyz + hit.t * d, 1);
 }

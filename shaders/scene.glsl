@@ -15,12 +15,12 @@ vec4 corner(uint i) { return texelFetch(s_corners, int(i)); }
 vec4 normal(uint i) { return texelFetch(s_normals, int(i)); }
 uint owner_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u))).x; }
 uint material_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u) + 1u)).x; }
-uint beside(uint id, int side) { return texelFetch(s_triangles, int(5u * (id - 1u) + 2u) + side).x; }
+uint neighbour(uint id, int side) { return texelFetch(s_triangles, int(5u * (id - 1u) + 2u) + side).x; }
 
 struct Material {
   vec4 colour;  // linear light; a: 1 when unlit
-  vec4 look;    // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
-  vec4 emitted; // linear light; a: layer of s_looks that multiplies it, or -1
+  vec4 parameters;  // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
+  vec4 emitted; // linear light; a: layer of s_colour_maps that multiplies it, or -1
   vec4 maps;    // layers of s_maps, or -1: occlusion, roughness and metalness (x); normals (y); scale of the
                 // normals' x and y (z); strength of the occlusion (w)
   ivec4 more;   // x: offset from a corner's number to its tangent in s_normals (the tangent's w is its
@@ -28,7 +28,7 @@ struct Material {
 };
 layout(std430, binding = k_materials_buffer) readonly buffer Materials { Material s_materials[]; };
 // Colour textures, one in each layer; sRGB is decoded on reading.
-layout(binding = k_colour_maps_unit) uniform sampler2DArray s_looks;
+layout(binding = k_colour_maps_unit) uniform sampler2DArray s_colour_maps;
 uniform bool u_has_cut_outs;  // whether any material has an alpha cutoff
 
 struct Owner {
@@ -36,7 +36,7 @@ struct Owner {
   vec4 lower;  // lower bound, owner frame; w: 1 when the part is shown
   vec4 upper;  // upper bound; w: 1 when its mode is surface
   vec4 colour; // override of the materials' colour, linear light, where w is 1
-  vec4 look;   // overrides of metallic and roughness, where not negative
+  vec4 metallic_roughness;  // overrides, where not negative
 };
 layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 8 for each owner
 
@@ -53,10 +53,10 @@ Owner owner_at(uint owner) {
 
 // A viewpoint: where rays start, with the ids that a pinhole image from there holds: layer 0 the prototype,
 // layer 1 the parts. Pixel (0,0) is the centre of the top-left texel.
-struct Sight {
-  mat4 sight_from_scene;
+struct Viewpoint {
+  mat4 pinhole_from_scene;
   vec4 focal_centre;  // fx, fy, cx, cy of the pinhole image
-  vec4 p_eye;         // position in the scene's frame; w: first layer of its ids
+  vec4 p_origin;      // position in the scene's frame; w: first layer of its ids
   vec4 size;          // xy: size of the pinhole image; zw: size of the imager's own image
   vec4 map;           // xy: tangents of the first node of the imager's pixel map; zw: nodes per tangent
   vec4 quality;       // focal length of the imager (px), width of the soft border (px), layer of its pixel
@@ -64,13 +64,14 @@ struct Sight {
   vec4 vignetting;    // tilt (xy), r2, r4 as in core/photometric_response.h
   vec4 focus;         // the blur disc of a point at depth z has a diameter of |x - y / z| pixels
 };
-layout(binding = k_viewpoints_unit) uniform samplerBuffer s_sights;  // 11 for each viewpoint
+layout(binding = k_viewpoints_unit) uniform samplerBuffer s_viewpoints;  // 11 for each viewpoint
 
-Sight sight_at(int i) {
+Viewpoint viewpoint_at(int i) {
   int first = 11 * i;
-  return Sight(matrix_at(s_sights, first), texelFetch(s_sights, first + 4), texelFetch(s_sights, first + 5),
-               texelFetch(s_sights, first + 6), texelFetch(s_sights, first + 7), texelFetch(s_sights, first + 8),
-               texelFetch(s_sights, first + 9), texelFetch(s_sights, first + 10));
+  return Viewpoint(matrix_at(s_viewpoints, first), texelFetch(s_viewpoints, first + 4),
+                   texelFetch(s_viewpoints, first + 5), texelFetch(s_viewpoints, first + 6),
+                   texelFetch(s_viewpoints, first + 7), texelFetch(s_viewpoints, first + 8),
+                   texelFetch(s_viewpoints, first + 9), texelFetch(s_viewpoints, first + 10));
 }
 
 struct Hit {
@@ -125,27 +126,27 @@ bool is_inside(Hit hit) { return all(greaterThanEqual(hit.weights, vec3(-hit.sla
 
 // Whether a triangle, as seen along w (frame of its owner), is thinner than two texels of the id image, so
 // that all texels may miss it.
-bool is_thin(uint id, float t, vec3 w, Sight sight) {
+bool is_thin(uint id, float t, vec3 w, Viewpoint viewpoint) {
   uint first = 3u * (id - 1u);
   vec3 a = corner(first).xyz, b = corner(first + 1u).xyz, c = corner(first + 2u).xyz;
   float side = max(distance(a, b), max(distance(b, c), distance(c, a)));
   float area = abs(dot(cross(b - a, c - a), w));
-  return area * sight.focal_centre.x < 2.0 * t * side;
+  return area * viewpoint.focal_centre.x < 2.0 * t * side;
 }
 
 // The ids of the four texels around the direction d, the nearest texel first, and their bilinear weights.
-uvec4 ids_around(usampler2DArray s_ids, Sight sight, int layer, vec3 d, out vec4 share) {
+uvec4 ids_around(usampler2DArray s_ids, Viewpoint viewpoint, int layer, vec3 d, out vec4 share) {
   share = vec4(1, 0, 0, 0);
-  vec3 q = mat3(sight.sight_from_scene) * d;
+  vec3 q = mat3(viewpoint.pinhole_from_scene) * d;
   if (q.z <= 0.0) return uvec4(0);
-  vec2 px = sight.focal_centre.xy * q.xy / q.z + sight.focal_centre.zw;
-  if (any(lessThan(px, vec2(-1))) || any(greaterThan(px, sight.size.xy))) return uvec4(0);
+  vec2 px = viewpoint.focal_centre.xy * q.xy / q.z + viewpoint.focal_centre.zw;
+  if (any(lessThan(px, vec2(-1))) || any(greaterThan(px, viewpoint.size.xy))) return uvec4(0);
   ivec2 near = ivec2(floor(px + 0.5));
   ivec2 beside = ivec2(px.x < float(near.x) ? -1 : 1, px.y < float(near.y) ? -1 : 1);
   vec2 f = abs(px - vec2(near));
   share = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
-  ivec2 last = ivec2(sight.size.xy) - 1;
-  int z = int(sight.p_eye.w) + layer;
+  ivec2 last = ivec2(viewpoint.size.xy) - 1;
+  int z = int(viewpoint.p_origin.w) + layer;
   uvec4 ids;
   ids.x = texelFetch(s_ids, ivec3(clamp(near, ivec2(0), last), z), 0).x;
   ids.y = texelFetch(s_ids, ivec3(clamp(near + ivec2(beside.x, 0), ivec2(0), last), z), 0).x;
@@ -189,29 +190,32 @@ float lod_of(vec2 texels, Hit hit, float footprint) {
   return area > 0.0 ? max(0.0, log2(footprint * sqrt(texel_area / area))) : 0.0;
 }
 
-float texture_lod(Hit hit, float footprint) { return lod_of(vec2(textureSize(s_looks, 0).xy), hit, footprint); }
+float texture_lod(Hit hit, float footprint) {
+  return lod_of(vec2(textureSize(s_colour_maps, 0).xy), hit, footprint);
+}
 
 // Whether the texture's alpha at the hit is below the material's cutoff; `footprint` is the side (m) of a
 // pixel's patch on the surface.
 bool is_cut_out(Hit hit, float footprint) {
   if (!u_has_cut_outs) return false;
-  vec4 look = s_materials[material_of(hit.id)].look;
-  if (look.w <= 0.0) return false;
+  vec4 parameters = s_materials[material_of(hit.id)].parameters;
+  if (parameters.w <= 0.0) return false;
   vec2 uv = uv_of(hit);
-  return textureLod(s_looks, vec3(uv.x, 1.0 - uv.y, look.x), texture_lod(hit, footprint)).a < look.w;
+  vec3 at = vec3(uv.x, 1.0 - uv.y, parameters.x);
+  return textureLod(s_colour_maps, at, texture_lod(hit, footprint)).a < parameters.w;
 }
 
 // Moves the hit of a ray that meets a triangle's plane just outside the triangle (frame of the owner) onto
 // the triangle. The distance stays that of the plane, or becomes that of the nearest point of the triangle
 // where the plane is too steep to extrapolate.
-Hit moved_beside(Hit hit, vec3 o, vec3 w, Sight sight) {
+Hit moved_onto_triangle(Hit hit, vec3 o, vec3 w, Viewpoint viewpoint) {
   hit.weights = max(hit.weights, vec3(0));
   hit.weights /= hit.weights.x + hit.weights.y + hit.weights.z;
   uint first = 3u * (hit.id - 1u);
   vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * hit.weights;
   float t = dot(p - o, w);
   const float k_steepest = 4.0;  // slope: texels of depth for each texel, 76 degrees
-  if (!(abs(hit.t - t) < k_steepest * t / sight.focal_centre.x)) hit.t = t;
+  if (!(abs(hit.t - t) < k_steepest * t / viewpoint.focal_centre.x)) hit.t = t;
   return hit;
 }
 
@@ -220,18 +224,18 @@ Hit moved_beside(Hit hit, vec3 o, vec3 w, Sight sight) {
 // by bilinear coverage. Parts may have an alpha cutoff, the prototype has none. (Software GL executes
 // branches that no lane takes, and executes a loop once too often if its condition comes first. So rare work
 // is a further round of a do-while loop.)
-Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
+Hit first_hit(usampler2DArray s_ids, Viewpoint viewpoint, int layer, vec3 d) {
   vec4 share;
-  uvec4 ids = ids_around(s_ids, sight, layer, d, share);
+  uvec4 ids = ids_around(s_ids, viewpoint, layer, d, share);
   Hit best = k_no_hit;
   if (ids == uvec4(0)) return best;
   uvec4 left = each_once(ids);
   uint nearest = left.x;
   bool is_covered = dot(share, vec4(notEqual(ids, uvec4(0)))) >= 0.5, is_whole = all(notEqual(ids, uvec4(0)));
   bool is_through = false;  // hit a piece below the alpha cutoff
-  bool is_beside = false;   // all were missed: the nearest is tried once more
+  bool is_retry = false;    // all were missed: the nearest is tried once more
   do {
-    vec3 o = sight.p_eye.xyz, w = d;  // in the owner's frame; the prototype's is the scene's
+    vec3 o = viewpoint.p_origin.xyz, w = d;  // in the owner's frame; the prototype's is the scene's
     if (layer != 0) {
       uint owner = owner_of(left.x);
       o = to_owner(owner, o);
@@ -240,39 +244,39 @@ Hit first_hit(usampler2DArray s_ids, Sight sight, int layer, vec3 d) {
     Hit hit;
     bool is_met = plane_hit_in_owner(left.x, o, w, hit);
     left = uvec4(left.yzw, 0u);
-    if (is_beside) {
+    if (is_retry) {
       if (!is_met) break;
-      hit = moved_beside(hit, o, w, sight);
-      if (hit.t > 0.0 && (is_whole || is_thin(hit.id, hit.t, w, sight))) best = hit;
+      hit = moved_onto_triangle(hit, o, w, viewpoint);
+      if (hit.t > 0.0 && (is_whole || is_thin(hit.id, hit.t, w, viewpoint))) best = hit;
       break;
     }
     if (is_met && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) {
-      if (layer == 1 && is_cut_out(hit, hit.t / sight.focal_centre.x))
+      if (layer == 1 && is_cut_out(hit, hit.t / viewpoint.focal_centre.x))
         is_through = true;
       else
         best = hit;
     }
-    is_beside = left.x == 0u && best.id == 0u && !is_through && is_covered;
-    if (is_beside) left.x = nearest;
+    is_retry = left.x == 0u && best.id == 0u && !is_through && is_covered;
+    if (is_retry) left.x = nearest;
   } while (left.x != 0u);
   return best;
 }
 
 // Whether the prototype hides p (a point on it) from the viewpoint.
-bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
-  vec3 d = p - sight.p_eye.xyz;
+bool is_hidden(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p) {
+  vec3 d = p - viewpoint.p_origin.xyz;
   float t = length(d);
   d /= t;
-  Hit hit = first_hit(s_ids, sight, 0, d);
+  Hit hit = first_hit(s_ids, viewpoint, 0, d);
   bool exact = hit.id != 0u && all(greaterThan(hit.weights, vec3(0)));
-  float texel = t / sight.focal_centre.x;
+  float texel = t / viewpoint.focal_centre.x;
   float slack = k_same_place + (exact ? 1e-5 * t : 2.0 * texel);
   if (hit.id != 0u && hit.t < t - slack) return true;
   // The ray may also hit another triangle of the texels, or a neighbour of one: at a silhouette of a smooth
   // surface, the last triangles are seen at such a grazing angle that texels miss them. The loop walks from
   // each triangle across its sides towards the ray.
   vec4 share;
-  uvec4 left = each_once(ids_around(s_ids, sight, 0, d, share));
+  uvec4 left = each_once(ids_around(s_ids, viewpoint, 0, d, share));
   if (left.y == 0u) return false;
   for (int k = 0; k < 4; ++k) {
     if (left[k] == hit.id || left[k] == 0u || dot(corner(3u * (left[k] - 1u)).xyz - p, d) > -2.0 * texel) left[k] = 0u;
@@ -283,14 +287,14 @@ bool is_hidden(usampler2DArray s_ids, Sight sight, vec3 p) {
   uint id = left.x, from = 0u;
   int step = 0;
   do {
-    Hit beside_it;
+    Hit neighbour_hit;
     uint next = 0u;
-    if (prototype_plane_hit(id, sight.p_eye.xyz, d, beside_it)) {
-      if (is_inside(beside_it)) {
-        if (beside_it.t < t - slack) return true;
+    if (prototype_plane_hit(id, viewpoint.p_origin.xyz, d, neighbour_hit)) {
+      if (is_inside(neighbour_hit)) {
+        if (neighbour_hit.t < t - slack) return true;
       } else {
-        vec3 w = beside_it.weights;
-        next = beside(id, w.x < w.y ? (w.x < w.z ? 0 : 2) : w.y < w.z ? 1 : 2);
+        vec3 w = neighbour_hit.weights;
+        next = neighbour(id, w.x < w.y ? (w.x < w.z ? 0 : 2) : w.y < w.z ? 1 : 2);
         // The walk turned back: the ray passes beside both triangles.
         if (next == from || ++step == k_most_steps) next = 0u;
       }
@@ -325,14 +329,14 @@ vec3 flat_normal(uint id) { return turned_to_scene(owner_of(id), flat_normal_in_
 vec3 smooth_normal(Hit hit) { return turned_to_scene(owner_of(hit.id), smooth_normal_in_owner(hit)); }
 
 // -1 if the corners' normals point away from the side of the triangle that a ray along d hits, else 1.
-float side_seen(vec3 n_smooth, Hit hit, vec3 d) {
+float facing_sign(vec3 n_smooth, Hit hit, vec3 d) {
   vec3 flat_one = flat_normal(hit.id);
   if (dot(flat_one, d) > 0.0) flat_one = -flat_one;
   return dot(n_smooth, flat_one) < 0.0 ? -1.0 : 1.0;
 }
 
 // The normal n, turned perpendicular to d if it would face away from the viewer.
-vec3 not_away(vec3 n, vec3 d) {
+vec3 turned_to_viewer(vec3 n, vec3 d) {
   float away = dot(n, d);
   return away > 0.0 ? normalize(n - away * d) : n;
 }
@@ -341,5 +345,5 @@ vec3 not_away(vec3 n, vec3 d) {
 // most.
 vec3 facing_normal(Hit hit, vec3 d) {
   vec3 n = smooth_normal(hit);
-  return not_away(side_seen(n, hit, d) * n, d);
+  return turned_to_viewer(facing_sign(n, hit, d) * n, d);
 }

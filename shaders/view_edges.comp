@@ -2,14 +2,14 @@
 // Draws a virtual camera's image: several samples for each listed pixel.
 #include "bindings.glsl"
 #include "view.glsl"
-#include "listed.glsl"
+#include "work_list.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
-  if (!is_listed()) return;
-  ivec2 at = listed_pixel();
+  if (!has_work()) return;
+  ivec2 at = work_pixel();
   vec4 sum = vec4(0);
   int k = 0;
   do {

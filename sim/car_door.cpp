@@ -439,8 +439,8 @@ nlohmann::ordered_json slot_json(const scene::Slot& slot) {
   return json;
 }
 
-// A designer's eye: right of the middle, at standing height above the table, 1.5 m away. World frame as in
-// config/worlds: z up, the door faces -y.
+// A designer's viewpoint: right of the middle, at standing height above the table, 1.5 m away. World frame as
+// in config/worlds: z up, the door faces -y.
 constexpr int k_viewer_size[2] = {1280, 800};
 constexpr double k_viewer_fov_deg = 36;
 Pose world_from_viewer() {

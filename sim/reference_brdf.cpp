@@ -52,9 +52,7 @@ double schlick(double cosine) {
   return x * x * x * x * x;
 }
 
-Vector3d fresnel(const Vector3d& head_on, double cosine) {
-  return head_on + (Vector3d::Ones() - head_on) * schlick(cosine);
-}
+Vector3d fresnel(const Vector3d& f0, double cosine) { return f0 + (Vector3d::Ones() - f0) * schlick(cosine); }
 
 // Smith's height-correlated visibility for GGX: G / (4 NL NV).
 double visibility(double nl, double nv, double alpha) {
@@ -74,13 +72,13 @@ double mean_schlick(double cosine) {
     std::array<double, k_fresnel_nodes> means{};
     for (int node = 0; node < k_fresnel_nodes; ++node) {
       const double z = static_cast<double>(node) / (k_fresnel_nodes - 1);
-      const Vector3d d_eye(std::sqrt(1 - z * z), 0, z);
+      const Vector3d d_view(std::sqrt(1 - z * z), 0, z);
       for (int i = 0; i < k_fresnel_directions; ++i) {
         const Eigen::Vector2d at = even_point(i);
         const double ring = std::sqrt(at.x()), angle = 2 * std::numbers::pi * at.y();
         const Vector3d d(ring * std::cos(angle), ring * std::sin(angle), std::sqrt(1 - at.x()));
         means[static_cast<std::size_t>(node)] +=
-            schlick(d_eye.dot((d_eye + d).normalized())) / k_fresnel_directions;
+            schlick(d_view.dot((d_view + d).normalized())) / k_fresnel_directions;
       }
     }
     return means;
@@ -107,67 +105,66 @@ const std::array<Eigen::Vector2d, k_directions>& slopes() {
 }
 
 // The reflected soft light, by importance sampling of GGX half vectors.
-Vector3d mirrored_soft(const SurfaceMaterial& substance,
-                       const Vector3d& head_on,
-                       const Vector3d& n,
-                       const Vector3d& d_eye,
-                       const scene::RoomLight& room) {
-  const double alpha = std::pow(std::max(substance.roughness, k_least_roughness), 2);
-  const double nv = std::max(1e-4, n.dot(d_eye));
+Vector3d specular_soft_light(const SurfaceMaterial& material,
+                             const Vector3d& f0,
+                             const Vector3d& n,
+                             const Vector3d& d_view,
+                             const scene::RoomLight& room) {
+  const double alpha = std::pow(std::max(material.roughness, k_least_roughness), 2);
+  const double nv = std::max(1e-4, n.dot(d_view));
   const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
   Vector3d sum = Vector3d::Zero();
   for (const Eigen::Vector2d& slope : slopes()) {
     const Vector3d h = (alpha * (slope.x() * d_u + slope.y() * d_v) + n).normalized();
-    const double vh = d_eye.dot(h), nh = n.dot(h);
-    const Vector3d d = 2 * vh * h - d_eye;
+    const double vh = d_view.dot(h), nh = n.dot(h);
+    const Vector3d d = 2 * vh * h - d_view;
     const double nl = n.dot(d);
     if (nl <= 0 || vh <= 0) continue;
     // The density of half vectors is D nh; that of directions is lower by the factor 4 vh.
-    sum += soft_from(room, d).cwiseProduct(fresnel(head_on, vh)) *
-           (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
+    sum += soft_from(room, d).cwiseProduct(fresnel(f0, vh)) * (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
   }
   return sum / k_directions;
 }
 
 }  // namespace
 
-PartsLight PartsLight::beside(const Imager& eye) {
-  const Eigen::Quaterniond world_from_eye = eye.imager_from_world.inverse().rotation;
+PartsLight PartsLight::beside(const Imager& viewer) {
+  const Eigen::Quaterniond world_from_viewer = viewer.imager_from_world.inverse().rotation;
   PartsLight light;
-  light.room.d_up_world = world_from_eye * -Vector3d::UnitY();
+  light.room.d_up_world = world_from_viewer * -Vector3d::UnitY();
   light.room.below_rgb.setConstant(k_soft_below);
   light.room.above_rgb.setConstant(k_soft_above);
-  light.room.lamps = {{world_from_eye * k_d_lamp_viewer, Vector3d::Constant(k_lamp)}};
+  light.room.lamps = {{world_from_viewer * k_d_lamp_viewer, Vector3d::Constant(k_lamp)}};
   return light;
 }
 
-Vector3d shaded(const SurfaceMaterial& substance,
+Vector3d shaded(const SurfaceMaterial& material,
                 const Vector3d& n,
-                const Vector3d& d_eye,
+                const Vector3d& d_view,
                 const scene::RoomLight& room) {
-  const Vector3d diffuse = (1 - substance.metallic) * substance.base;
-  const Vector3d head_on =
-      (1 - substance.metallic) * Vector3d::Constant(k_dielectric) + substance.metallic * substance.base;
-  const double nv = std::max(1e-4, n.dot(d_eye));
-  const double alpha = std::pow(std::max(substance.roughness, k_lamp_roughness), 2);
+  const Vector3d diffuse = (1 - material.metallic) * material.base;
+  const Vector3d f0 =
+      (1 - material.metallic) * Vector3d::Constant(k_dielectric) + material.metallic * material.base;
+  const double nv = std::max(1e-4, n.dot(d_view));
+  const double alpha = std::pow(std::max(material.roughness, k_lamp_roughness), 2);
   Vector3d soft = diffuse.cwiseProduct(soft_on(room, n)), by_lamps = Vector3d::Zero();
-  if (!substance.is_plain) {
-    const Vector3d mean = head_on + (Vector3d::Ones() - head_on) * mean_schlick(nv);
-    soft = soft.cwiseProduct(Vector3d::Ones() - mean) + mirrored_soft(substance, head_on, n, d_eye, room);
+  if (!material.is_diffuse) {
+    const Vector3d mean = f0 + (Vector3d::Ones() - f0) * mean_schlick(nv);
+    soft = soft.cwiseProduct(Vector3d::Ones() - mean) + specular_soft_light(material, f0, n, d_view, room);
   }
   for (const scene::RoomLight::Lamp& lamp : room.lamps) {
     const double nl = n.dot(lamp.d_world);
     if (nl <= 0) continue;
     Vector3d reflected = diffuse;  // without 1 / pi, because a lamp's strength contains the factor pi
-    if (!substance.is_plain) {
-      const Vector3d h = (d_eye + lamp.d_world).normalized();
-      const Vector3d mirrored = fresnel(head_on, d_eye.dot(h));
-      reflected = (Vector3d::Ones() - mirrored).cwiseProduct(diffuse) +
-                  mirrored * (std::numbers::pi * ggx(n.dot(h), alpha) * visibility(nl, nv, alpha));
+    if (!material.is_diffuse) {
+      const Vector3d h = (d_view + lamp.d_world).normalized();
+      const Vector3d specular = fresnel(f0, d_view.dot(h));
+      reflected = (Vector3d::Ones() - specular).cwiseProduct(diffuse) +
+                  specular * (std::numbers::pi * ggx(n.dot(h), alpha) * visibility(nl, nv, alpha));
     }
     by_lamps += nl * reflected.cwiseProduct(bgr(lamp.strength_rgb));
   }
-  return substance.open * soft + by_lamps + substance.emitted;
+  return material.occlusion * soft + by_lamps + material.emitted;
 }
 
 }  // namespace limn::sim

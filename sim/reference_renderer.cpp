@@ -33,7 +33,7 @@ Eigen::Vector3d turned_against(const Eigen::Vector3d& n, const Eigen::Vector3d& 
 }
 
 // The normal n, turned perpendicular to d if it would face away from the viewer (at a silhouette).
-Eigen::Vector3d aside(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
+Eigen::Vector3d turned_to_viewer(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
   return n.dot(d) > 0 ? Eigen::Vector3d((n - n.dot(d) * d).normalized()) : n;
 }
 
@@ -42,7 +42,7 @@ Eigen::Vector3d aside(const Eigen::Vector3d& n, const Eigen::Vector3d& d) {
 ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene& parts, const Imager& viewer)
     : world_(world),
       prototype_(prototype_of(world)),
-      p_eye_(viewer.imager_from_world.inverse().translation),
+      p_viewer_(viewer.imager_from_world.inverse().translation),
       light_(PartsLight::beside(viewer)) {
   LIMN_CHECK(world.scene.has_value());
   if (const auto& room = parts.light ? parts.light : world.scene->light) light_ = {*room, true};
@@ -61,9 +61,9 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
 template <class SampleAt>
 PartImage ReferenceRenderer::averaged(const Imager& imager, const SampleAt& sample_at) {
   const Directions directions(imager);
-  const Eigen::Vector3d p_eye = imager.imager_from_world.inverse().translation;
+  const Eigen::Vector3d p_imager = imager.imager_from_world.inverse().translation;
   const auto along = [&](const Eigen::Vector3f& d) {
-    return d.allFinite() ? sample_at(Ray{p_eye, d.cast<double>().normalized()}) : Sample{};
+    return d.allFinite() ? sample_at(Ray{p_imager, d.cast<double>().normalized()}) : Sample{};
   };
   const auto width = static_cast<std::size_t>(imager.width);
   const auto corner_row = [&](int row) {
@@ -136,13 +136,13 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
                                                   const Nearest& nearest,
                                                   const PartsLight& light) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial substance =
+  const SurfaceMaterial material =
       surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
-  if (substance.is_unlit) return substance.base.cast<float>();
+  if (material.is_unlit) return material.base.cast<float>();
   const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
   const double side = part.rays.shading_normal(nearest.hit).dot(face) < 0 ? -1 : 1;
-  const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), d);
-  return shaded(substance, n, -d, light.room).cast<float>();
+  const Eigen::Vector3d n = turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, material.along), d);
+  return shaded(material, n, -d, light.room).cast<float>();
 }
 
 // If no room light is known, the light comes along the prototype's normal and nothing is reflected
@@ -150,27 +150,28 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
 Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
                                                        const Eigen::Vector3d& d_normal) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial substance =
+  const SurfaceMaterial material =
       surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
-  if (substance.is_unlit) return substance.base.cast<float>();
+  if (material.is_unlit) return material.base.cast<float>();
   const double side = part.rays.shading_normal(nearest.hit).dot(d_normal) < 0 ? -1 : 1;
-  const Eigen::Vector3d n = aside(side * part.rays.mapped_normal(nearest.hit, substance.along), -d_normal);
-  if (light_.is_known) return shaded(substance, n, d_normal, light_.room).cast<float>();
-  const Eigen::Vector3d light = substance.open * light_.room.above_rgb.reverse() +
+  const Eigen::Vector3d n =
+      turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, material.along), -d_normal);
+  if (light_.is_room_light) return shaded(material, n, d_normal, light_.room).cast<float>();
+  const Eigen::Vector3d light = material.occlusion * light_.room.above_rgb.reverse() +
                                 n.dot(d_normal) * light_.room.lamps[0].strength_rgb.reverse();
-  return (substance.base.cwiseProduct(light) + substance.emitted).cast<float>();
+  return (material.base.cwiseProduct(light) + material.emitted).cast<float>();
 }
 
 // The view part that the viewer sees in front of p, a point of the prototype.
 ReferenceRenderer::Sample ReferenceRenderer::view_sample(const Eigen::Vector3d& p,
                                                          const Eigen::Vector3d& n_face) const {
-  const double distance = (p - p_eye_).norm();
-  const Ray ray{p_eye_, (p - p_eye_) / distance};
+  const double distance = (p - p_viewer_).norm();
+  const Ray ray{p_viewer_, (p - p_viewer_) / distance};
   if (n_face.dot(ray.d) >= 0) return {};  // the viewer sees the other side
   const Nearest nearest = nearest_part(ray);
   if (nearest.part < 0 || nearest.hit.distance > distance) return {};
   if (parts_[static_cast<std::size_t>(nearest.part)].on_surface) return {};
-  if (!prototype_.reached(p_eye_, p)) return {};
+  if (!prototype_.reached(p_viewer_, p)) return {};
   return {nearest.part, radiance_along(ray.d, nearest, light_)};
 }
 
@@ -217,13 +218,13 @@ PartImage ReferenceRenderer::projector_image(std::size_t index) const {
 }
 
 PartImage ReferenceRenderer::parts_image(const Imager& imager) const {
-  const PartsLight light = light_.is_known ? light_ : PartsLight::beside(imager);
+  const PartsLight light = light_.is_room_light ? light_ : PartsLight::beside(imager);
   return averaged(imager, [&](const Ray& ray) { return parts_along(ray, light); });
 }
 
 DepthOrder ReferenceRenderer::depth_order(const Imager& imager) const {
   const Directions directions(imager);
-  const Eigen::Vector3d p_eye = imager.imager_from_world.inverse().translation;
+  const Eigen::Vector3d p_imager = imager.imager_from_world.inverse().translation;
   DepthOrder out{cv::Mat(imager.height, imager.width, CV_16S, cv::Scalar(-1)),
                  cv::Mat(imager.height, imager.width, CV_8U, cv::Scalar(0))};
   cv::parallel_for_({0, imager.height}, [&](const cv::Range& rows) {
@@ -233,7 +234,7 @@ DepthOrder ReferenceRenderer::depth_order(const Imager& imager) const {
       for (int column = 0; column < imager.width; ++column) {
         const Eigen::Vector3f& direction = d[static_cast<std::size_t>(column)];
         if (!direction.allFinite()) continue;
-        const Ray ray{p_eye, direction.cast<double>().normalized()};
+        const Ray ray{p_imager, direction.cast<double>().normalized()};
         const Nearest nearest = nearest_part(ray);
         if (nearest.part < 0) continue;
         const Hit behind = prototype_.first_hit(ray);

@@ -28,7 +28,7 @@ struct DepthOrder {
 };
 
 /// A ray tracer that computes which light should fall on the prototype, and how the parts look in an imager.
-/// It is the reference for projector/: it follows the same conventions (scene/scene.h, shaders/look.glsl),
+/// It is the reference for projector/: it follows the same conventions (scene/scene.h, shaders/shading.glsl),
 /// but shares no code with it. Only the prototype occludes and casts shadows. Borrows the world and its
 /// scene's meshes, which must outlive it unchanged.
 class ReferenceRenderer {
@@ -79,7 +79,7 @@ class ReferenceRenderer {
   const World& world_;
   RayScene prototype_;
   std::vector<Part> parts_;
-  Eigen::Vector3d p_eye_;
+  Eigen::Vector3d p_viewer_;
   PartsLight light_;
 };
 

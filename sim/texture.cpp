@@ -95,7 +95,8 @@ SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Ei
   found.is_unlit = material.unlit;
   found.metallic = static_cast<double>(material.metallic);
   found.roughness = static_cast<double>(material.roughness);
-  found.is_plain = material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.image.empty();
+  found.is_diffuse =
+      material.metallic == 0 && material.roughness == 1 && maps.metallic_roughness.image.empty();
   found.emitted = material.emitted.reverse().cast<double>();
   found.along = Eigen::Vector3d::UnitZ();
   if (!maps.metallic_roughness.image.empty()) {
@@ -105,7 +106,7 @@ SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Ei
   }
   if (!maps.occlusion.image.empty()) {
     const auto red = static_cast<double>(between_texels(maps.occlusion.image, uv, repeated_numbers)[2]);
-    found.open = 1 - static_cast<double>(maps.occlusion_strength) * (1 - red);
+    found.occlusion = 1 - static_cast<double>(maps.occlusion_strength) * (1 - red);
   }
   if (!maps.emission.image.empty())
     found.emitted.array() *= between_texels(maps.emission.image, uv, repeated_texel).cast<double>().array();

@@ -23,8 +23,8 @@ struct SurfaceMaterial {
   Eigen::Vector3d base;  ///< Base colour, linear BGR.
   bool is_unlit = false;
   double metallic = 0, roughness = 1;
-  bool is_plain = false;    ///< Purely diffuse: neither metal nor gloss, and no texture of them.
-  double open = 1;          ///< Share of soft light that the occlusion map leaves.
+  bool is_diffuse = false;  ///< Purely diffuse: neither metal nor gloss, and no texture of them.
+  double occlusion = 1;     ///< Share of soft light that the occlusion map leaves.
   Eigen::Vector3d emitted;  ///< Emitted light, linear BGR.
   Eigen::Vector3d along;  ///< Normal from the normal map: components along tangent, bitangent and the mesh's
                           ///< normal; not of unit length.

@@ -61,7 +61,7 @@ class Tracer {
         imager_(world.rig.cameras.at(static_cast<std::size_t>(camera))),
         scene_(placed(world.objects)),
         directions_(imager_),
-        p_eye_(imager_.imager_from_world.inverse().translation) {
+        p_camera_(imager_.imager_from_world.inverse().translation) {
     for (const Lamp& lamp : world.room.lamps)
       for (const LampPoint& point : points_of(lamp)) lamps_.push_back(point);
     for (const Imager& projector : world.rig.projectors)
@@ -86,7 +86,7 @@ class Tracer {
     Eigen::Vector3f p = Eigen::Vector3f::Zero(), n = Eigen::Vector3f::Zero(),
                     albedo = Eigen::Vector3f::Zero();
     float room_light = 0;
-    std::vector<float> lit;
+    std::vector<float> reached;
   };
   struct Refined {
     std::int32_t pixel;
@@ -103,7 +103,7 @@ class Tracer {
     const Object& object = world_.objects[static_cast<std::size_t>(hit.object)];
     s.object = hit.object;
     s.distance = static_cast<float>(hit.distance);
-    s.p = (p_eye_ + hit.distance * d.cast<double>()).cast<float>();
+    s.p = (p_camera_ + hit.distance * d.cast<double>()).cast<float>();
     s.n_face = scene_.face_normal(hit).cast<float>();
     s.n = scene_.shading_normal(hit).cast<float>();
     const bool back = s.n_face.dot(d) > 0;
@@ -121,7 +121,7 @@ class Tracer {
 
   std::vector<Surface> surfaces(std::span<const Eigen::Vector3f> d) const {
     std::vector<Hit> hits(d.size());
-    scene_.first_hits(p_eye_, d, hits);
+    scene_.first_hits(p_camera_, d, hits);
     std::vector<Surface> found(d.size());
     for (std::size_t i = 0; i < d.size(); ++i) found[i] = surface(hits[i], d[i]);
     return found;
@@ -174,7 +174,7 @@ class Tracer {
     surfaces_.resize(count);
     edge_.assign(count, 0);
     room_.assign(count, 0);
-    lit_.assign(world_.rig.projectors.size(), std::vector<std::uint8_t>(count, 0));
+    reached_.assign(world_.rig.projectors.size(), std::vector<std::uint8_t>(count, 0));
     constexpr int k_strip = 16;  // rows of a strip; the corner row between strips is traced twice
     cv::parallel_for_({0, (imager_.height + k_strip - 1) / k_strip}, [&](const cv::Range& strips) {
       for (int strip = strips.start; strip < strips.end; ++strip)
@@ -207,9 +207,9 @@ class Tracer {
   }
 
   void light_row(std::span<const Surface> row, std::size_t at) {
-    for (std::size_t k = 0; k < lit_.size(); ++k) {
+    for (std::size_t k = 0; k < reached_.size(); ++k) {
       const std::vector<std::uint8_t> result = reached_from(p_projectors_[k], row);
-      std::copy(result.begin(), result.end(), lit_[k].begin() + static_cast<std::ptrdiff_t>(at));
+      std::copy(result.begin(), result.end(), reached_[k].begin() + static_cast<std::ptrdiff_t>(at));
     }
     for (std::size_t i = 0; i < row.size(); ++i) room_[at + i] = ambient_light(row[i]);
     for (const LampPoint& lamp : lamps_) {
@@ -222,14 +222,14 @@ class Tracer {
   // Where a projector's light ends between two pixels, both are marked as edges.
   void mark_shadow_edges() {
     const int width = imager_.width, height = imager_.height;
-    for (const auto& lit : lit_)
+    for (const auto& reached : reached_)
       for (int row = 0; row < height; ++row)
         for (int column = 0; column < width; ++column) {
           const auto i = static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                          static_cast<std::size_t>(column);
-          if (column + 1 < width && lit[i] != lit[i + 1]) edge_[i] = edge_[i + 1] = 1;
+          if (column + 1 < width && reached[i] != reached[i + 1]) edge_[i] = edge_[i + 1] = 1;
           const std::size_t below = i + static_cast<std::size_t>(width);
-          if (row + 1 < height && lit[i] != lit[below]) edge_[i] = edge_[below] = 1;
+          if (row + 1 < height && reached[i] != reached[below]) edge_[i] = edge_[below] = 1;
         }
   }
 
@@ -267,9 +267,9 @@ class Tracer {
       d[k] = directions_.at(at.x(), at.y());
     }
     const std::vector<Surface> found = surfaces(d);
-    std::vector<std::vector<std::uint8_t>> lit_by;
+    std::vector<std::vector<std::uint8_t>> reached_by;
     for (const Eigen::Vector3d& p_projector : p_projectors_)
-      lit_by.push_back(reached_from(p_projector, found));
+      reached_by.push_back(reached_from(p_projector, found));
     std::vector<float> room(found.size());
     for (std::size_t k = 0; k < found.size(); ++k) room[k] = ambient_light(found[k]);
     for (const LampPoint& lamp : lamps_) {
@@ -285,7 +285,8 @@ class Tracer {
       group.n += found[k].n;
       group.albedo += found[k].albedo;
       group.room_light += room[k];
-      for (std::size_t j = 0; j < lit_by.size(); ++j) group.lit[j] += static_cast<float>(lit_by[j][k]);
+      for (std::size_t j = 0; j < reached_by.size(); ++j)
+        group.reached[j] += static_cast<float>(reached_by[j][k]);
     }
     return groups;
   }
@@ -296,7 +297,7 @@ class Tracer {
         return group;
     Group group;
     group.first = s;
-    group.lit.assign(p_projectors_.size(), 0);
+    group.reached.assign(p_projectors_.size(), 0);
     groups.push_back(std::move(group));
     return groups.back();
   }
@@ -339,8 +340,8 @@ class Tracer {
     samples_.albedo[i] = s.albedo;
     samples_.grey[i] = s.albedo.mean();
     samples_.room_light[i] = room_light;
-    for (std::size_t k = 0; k < lit_.size(); ++k)
-      samples_.projectors[k][i].gain = lit_[k][static_cast<std::size_t>(pixel)];
+    for (std::size_t k = 0; k < reached_.size(); ++k)
+      samples_.projectors[k][i].gain = reached_[k][static_cast<std::size_t>(pixel)];
   }
   void put(std::size_t i, std::int32_t pixel, const Group& group) {
     Surface mean = group.first;
@@ -350,8 +351,8 @@ class Tracer {
     put(i, pixel, mean, group.room_light / group.count);
     samples_.weight[i] = group.count / k_edge_samples;
     samples_.grey[i] *= samples_.weight[i];
-    for (std::size_t k = 0; k < group.lit.size(); ++k)
-      samples_.projectors[k][i].gain = group.lit[k] / group.count;
+    for (std::size_t k = 0; k < group.reached.size(); ++k)
+      samples_.projectors[k][i].gain = group.reached[k] / group.count;
   }
 
   // Computes how the projectors light a sample, by their true lenses.
@@ -382,13 +383,13 @@ class Tracer {
   const Imager& imager_;
   RayScene scene_;
   Directions directions_;
-  Eigen::Vector3d p_eye_;
+  Eigen::Vector3d p_camera_;
   std::vector<LampPoint> lamps_;
   std::vector<Eigen::Vector3d> p_projectors_;
   std::vector<Surface> surfaces_;  // at pixel centres
   std::vector<std::uint8_t> edge_;
   std::vector<float> room_;
-  std::vector<std::vector<std::uint8_t>> lit_;  // for each projector, at pixel centres
+  std::vector<std::vector<std::uint8_t>> reached_;  // for each projector, at pixel centres
   std::vector<Refined> refined_;
   Samples samples_;
 };

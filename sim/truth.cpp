@@ -77,13 +77,13 @@ bool Truth::visible(const Imager& imager, const Eigen::Vector3d& p_world) const 
 
 std::vector<Hit> Truth::hits(const RayScene& scene, const Imager& imager) const {
   const std::vector<Eigen::Vector3f> d = world_directions(imager);
-  const Eigen::Vector3d p_eye = imager.imager_from_world.inverse().translation;
+  const Eigen::Vector3d p_imager = imager.imager_from_world.inverse().translation;
   std::vector<Hit> hits(d.size());
   const auto width = static_cast<std::size_t>(imager.width);
   cv::parallel_for_({0, imager.height}, [&](const cv::Range& rows) {
     const std::size_t begin = static_cast<std::size_t>(rows.start) * width;
     const std::size_t count = static_cast<std::size_t>(rows.size()) * width;
-    scene.first_hits(p_eye, std::span(d).subspan(begin, count), std::span(hits).subspan(begin, count));
+    scene.first_hits(p_imager, std::span(d).subspan(begin, count), std::span(hits).subspan(begin, count));
   });
   return hits;
 }
@@ -103,7 +103,7 @@ ObjectImage Truth::object_image(const Imager& imager) const {
   return result;
 }
 
-bool Truth::projected(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_world) const {
+bool Truth::is_reached_by_projector(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_world) const {
   return std::any_of(world_.rig.projectors.begin(), world_.rig.projectors.end(),
                      [&](const Imager& projector) {
                        const auto px = projector.project(p_world);
@@ -127,7 +127,7 @@ cv::Mat Truth::part_mask(const Imager& viewer, const std::string& slot) const {
   const RayScene part_scene(meshes);
   const std::vector<Hit> part_hits = hits(part_scene, viewer), behind = hits(prototype_, viewer);
   const std::vector<Eigen::Vector3f> d = world_directions(viewer);
-  const Eigen::Vector3d p_eye = viewer.imager_from_world.inverse().translation;
+  const Eigen::Vector3d p_imager = viewer.imager_from_world.inverse().translation;
   auto* out = mask.ptr();
   for (std::size_t i = 0; i < part_hits.size(); ++i) {
     if (part_hits[i].object < 0) continue;
@@ -142,7 +142,7 @@ cv::Mat Truth::part_mask(const Imager& viewer, const std::string& slot) const {
         std::max(0.05, std::abs(n.dot(direction)));  // a ray runs 1 / slant longer than the gap
     const double allowed = part->slot->mode == scene::Mode::surface ? k_surface_reach / slant : 0;
     if (part_hits[i].distance > behind[i].distance + allowed) continue;
-    out[i] = projected(p_eye + behind[i].distance * direction, n) ? 255 : 128;
+    out[i] = is_reached_by_projector(p_imager + behind[i].distance * direction, n) ? 255 : 128;
   }
   return mask;
 }

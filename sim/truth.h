@@ -63,7 +63,7 @@ class Truth {
     const scene::Mesh* mesh;
   };
   std::vector<Hit> hits(const RayScene& scene, const Imager& imager) const;
-  bool projected(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_world) const;
+  bool is_reached_by_projector(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_world) const;
   const Part* find_part(const std::string& slot) const;
 
   const World& world_;

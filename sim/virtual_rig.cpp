@@ -95,7 +95,7 @@ void VirtualRig::restore_prototype() {
   prototype_home_.reset();
 }
 
-void VirtualRig::darken() { shown_.assign(projectors_.size(), {ShownImage{cv::Mat(), now_}}); }
+void VirtualRig::darken() { projected_.assign(projectors_.size(), {ProjectedImage{cv::Mat(), now_}}); }
 
 const Samples& VirtualRig::samples(int camera) {
   auto& samples = samples_.at(static_cast<std::size_t>(camera));
@@ -111,21 +111,21 @@ Result<Stamp> VirtualRig::show(int projector, const cv::Mat& image) {
         "projector's size.",
         this->projector(projector).name(), size.width, size.height, image.cols, image.rows, image.channels());
   const Stamp shown_at = shifted(now_, options_.display_delay_s);
-  shown_[static_cast<std::size_t>(projector)].push_back({image.clone(), shown_at});
+  projected_[static_cast<std::size_t>(projector)].push_back({image.clone(), shown_at});
   return shown_at;
 }
 
 Stamp VirtualRig::light_settles_at() const {
   Stamp settled = now_;
-  for (const auto& queue : shown_) settled = std::max(settled, queue.back().shown_at);
+  for (const auto& queue : projected_) settled = std::max(settled, queue.back().shown_at);
   return settled;
 }
 
 std::vector<cv::Mat> VirtualRig::images_at(Stamp moment) const {
   std::vector<cv::Mat> images;
-  for (const auto& queue : shown_) {
+  for (const auto& queue : projected_) {
     const auto later = std::find_if(queue.begin() + 1, queue.end(),
-                                    [&](const ShownImage& s) { return s.shown_at > moment; });
+                                    [&](const ProjectedImage& s) { return s.shown_at > moment; });
     images.push_back(std::prev(later)->image);
   }
   return images;
@@ -140,7 +140,7 @@ Stamp VirtualRig::next_exposure() const {
 std::vector<Frame> VirtualRig::expose(std::span<const int> cameras) {
   const Stamp captured_at = next_exposure();
   const std::vector<cv::Mat> shown = images_at(captured_at);
-  for (auto& queue : shown_)  // images that a newer one has replaced are dropped
+  for (auto& queue : projected_)  // images that a newer one has replaced are dropped
     while (queue.size() > 1 && queue[1].shown_at <= captured_at) queue.erase(queue.begin());
   std::vector<Frame> frames;
   for (const int camera : cameras)

@@ -67,7 +67,7 @@ class VirtualRig {
  private:
   class Camera;
   class Projector;
-  struct ShownImage {
+  struct ProjectedImage {
     cv::Mat image;
     Stamp shown_at;
   };
@@ -83,7 +83,7 @@ class VirtualRig {
   std::optional<Pose> prototype_home_;  // set while the prototype is removed
   std::vector<CameraEffects> effects_home_;
   // For each projector, oldest first; the first one is on the surface.
-  std::vector<std::vector<ShownImage>> shown_;
+  std::vector<std::vector<ProjectedImage>> projected_;
   std::vector<std::optional<Samples>> samples_;
   std::vector<std::unique_ptr<Camera>> cameras_;
   std::vector<std::unique_ptr<Projector>> projectors_;

@@ -52,11 +52,11 @@ Lens read_lens(const ConfigNode& node) {
   return lens ? *lens : Lens{};
 }
 
-// Reads either the pose itself, or an eye point and a target.
+// Reads either the pose itself, or a viewpoint and a target.
 Pose read_imager_pose(const ConfigNode& node) {
   if (const auto pose = node.find("imager_from_world")) return pose->pose();
-  const Eigen::Vector3d p_eye = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
-  const Eigen::Vector3d d = p_target - p_eye;
+  const Eigen::Vector3d p_imager = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
+  const Eigen::Vector3d d = p_target - p_imager;
   if (d.norm() < 1e-6 || d.head<2>().norm() < 1e-6 * d.norm()) {
     node.at("target_m")
         .problem(
@@ -64,7 +64,7 @@ Pose read_imager_pose(const ConfigNode& node) {
             "Give imager_from_world instead.");
     return {};
   }
-  return looking_at(p_eye, p_target, Eigen::Vector3d::UnitZ());
+  return looking_at(p_imager, p_target, Eigen::Vector3d::UnitZ());
 }
 
 Imager read_imager(const ConfigNode& node) {

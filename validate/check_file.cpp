@@ -35,8 +35,8 @@ Imager read_imager(const ConfigNode& node) {
   }
   if (const auto pose = node.find("world_from_viewer"))
     return viewer_imager(pose->pose(), width, height, fov_deg);
-  const Eigen::Vector3d p_eye = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
-  const Eigen::Vector3d d = p_target - p_eye;
+  const Eigen::Vector3d p_viewer = node.at("eye_m").vector3(), p_target = node.at("target_m").vector3();
+  const Eigen::Vector3d d = p_target - p_viewer;
   if (d.head<2>().norm() < 1e-6 * std::max(1.0, d.norm())) {
     node.at("target_m")
         .problem(
@@ -44,7 +44,7 @@ Imager read_imager(const ConfigNode& node) {
             "world_from_viewer instead.");
     return viewer_imager({}, width, height, fov_deg);
   }
-  return viewer_imager(looking_at(p_eye, p_target, Eigen::Vector3d::UnitZ()).inverse(), width, height,
+  return viewer_imager(looking_at(p_viewer, p_target, Eigen::Vector3d::UnitZ()).inverse(), width, height,
                        fov_deg);
 }
 
@@ -91,7 +91,7 @@ std::vector<CheckLimit> read_limits(const ConfigNode& node) {
 }
 
 // Replaces the world's scene, and the prototype in the world by that scene's.
-void put_on_stage(scene::Scene scene, sim::World* world) {
+void replace_scene(scene::Scene scene, sim::World* world) {
   world->scene = std::move(scene);
   std::erase_if(world->objects, [](const sim::Object& object) { return object.name == "prototype"; });
   if (!world->scene->prototype) return;
@@ -193,29 +193,29 @@ void coarsen(const ConfigNode& node, Rig* rig) {
 
 // Chooses the file's viewers, or else the scene's. Several are replaced by their shared viewpoint, with an
 // image like the first one's.
-Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
-  const scene::Scene& scene = check->told.scene;
-  std::vector<scene::Viewpoint> eyes = check->posed.viewpoints;
+Status choose_viewer(const std::vector<Viewer>& viewers, Check* check) {
+  const scene::Scene& scene = check->renderer_input.scene;
+  std::vector<scene::Viewpoint> viewpoints = check->posed.viewpoints;
   std::optional<Imager> like;
-  if (!told.empty()) {
-    eyes.clear();
-    like = told[0].imager;
-    for (const Viewer& viewer : told)
-      eyes.push_back({fmt::format("viewer{}", eyes.size()),
-                      viewer.imager.imager_from_world.inverse().translation, viewer.weight});
+  if (!viewers.empty()) {
+    viewpoints.clear();
+    like = viewers[0].imager;
+    for (const Viewer& viewer : viewers)
+      viewpoints.push_back({fmt::format("viewer{}", viewpoints.size()),
+                            viewer.imager.imager_from_world.inverse().translation, viewer.weight});
   } else if (!scene.viewers.empty()) {
     like = scene.viewers[0].fixed;
   }
-  const bool is_alone = told.empty() ? scene.viewers.size() == 1 : told.size() == 1;
+  const bool is_alone = viewers.empty() ? scene.viewers.size() == 1 : viewers.size() == 1;
   if (is_alone && like) {
     check->viewer = *like;
     return {};
   }
   const Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();
-  if (eyes.empty())
+  if (viewpoints.empty())
     return error("viewer: expected one, because the scene has none in the world, found none.");
   const scene::SharedViewpoint shared =
-      scene::updated_viewpoint({}, eyes, *scene::middle_of(scene, check->posed), 0);
+      scene::updated_viewpoint({}, viewpoints, *scene::middle_of(scene, check->posed), 0);
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, check->posed, d_up_world);
   if (!viewer)
     return error(
@@ -227,7 +227,7 @@ Status choose_viewer(const std::vector<Viewer>& told, Check* check) {
     check->viewer = viewer_imager(viewer->imager_from_world.inverse(), like->width, like->height,
                                   360 / std::numbers::pi * std::atan(half));
   }
-  if (eyes.size() > 1) check->shares = shared.shares;
+  if (viewpoints.size() > 1) check->shares = shared.shares;
   return {};
 }
 
@@ -254,7 +254,7 @@ Hand read_hand(const ConfigNode& node, const Rig& rig) {
   Hand hand;
   const auto found = std::find(names.begin(), names.end(), node.at("before").choice(names));
   if (found != names.end()) hand.projector = static_cast<std::size_t>(found - names.begin());
-  hand.p_aim = node.at("aim_m").vector3();
+  hand.p_target = node.at("aim_m").vector3();
   hand.at = node.at("at").positive();
   if (hand.at >= 1)
     node.at("at").problem(fmt::format("expected a share of the way below 1, found {}.", hand.at));
@@ -313,7 +313,7 @@ Result<Check> load_check(const fs::path& path) {
   LIMN_TRY(check.truth, sim::load_world(world_file, marker_image));
   if (!scene_folder.empty()) {
     LIMN_TRY(scene::Scene other, scene::load_scene((config.folder() / scene_folder).lexically_normal()));
-    put_on_stage(std::move(other), &check.truth);
+    replace_scene(std::move(other), &check.truth);
   }
   if (!check.truth.scene || !check.truth.scene->prototype) {
     return error(
@@ -327,7 +327,7 @@ Result<Check> load_check(const fs::path& path) {
     const Eigen::Vector3d rgb = node->vector3();
     if (sim::Object* prototype = check.truth.find("prototype")) prototype->albedo = rgb.reverse();
   }
-  check.told = {check.truth.rig, *check.truth.scene, check.posed};
+  check.renderer_input = {check.truth.rig, *check.truth.scene, check.posed};
   if (const Status chosen = choose_viewer(viewers, &check); !chosen)
     return error("{}: {}", path.string(), chosen.message());
   if (const auto node = root.find("nudge")) nudge(*node, &check.truth.rig);

@@ -44,9 +44,9 @@ struct Check {
   std::vector<scene::SharedViewpoint::Share> shares;  ///< Shares of the viewers in it; empty for one.
   Hand hand;                                          ///< The hand that shades in `refill_…`.
 
-  sim::World truth;         ///< The true world, with the injected nudges.
-  scene::PosedScene posed;  ///< The true poses of the parts.
-  RendererInput told;       ///< The same without the nudges.
+  sim::World truth;              ///< The true world, with the injected nudges.
+  scene::PosedScene posed;       ///< The true poses of the parts.
+  RendererInput renderer_input;  ///< The same without the nudges.
 };
 
 /// Reads a check file (limn.check/1, keys in config/README.md) with the world, scene and poses that it names.

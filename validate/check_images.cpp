@@ -28,7 +28,7 @@ cv::Mat nearly_even(const cv::Mat& image) {
 
 }  // namespace
 
-cv::Mat eye_image(const cv::Mat& light) {
+cv::Mat srgb_image(const cv::Mat& light) {
   cv::Mat levels(light.size(), CV_8UC3);
   for (int row = 0; row < light.rows; ++row)
     for (int column = 0; column < light.cols; ++column)

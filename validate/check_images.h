@@ -11,7 +11,7 @@ constexpr double k_seam_blur_px =
     1;  // 8-bit levels average out; a viewer at this resolution sees no finer detail
 
 /// Linear light (CV_32FC3) as 8-bit sRGB.
-cv::Mat eye_image(const cv::Mat& light);
+cv::Mat srgb_image(const cv::Mat& light);
 
 /// A projector's 8-bit image as linear light (CV_32F).
 cv::Mat linear_light(const cv::Mat& image);

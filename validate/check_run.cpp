@@ -7,7 +7,7 @@
 namespace limn::apps {
 namespace {
 
-sim::World staged(const Check& check) {
+sim::World reduced_world(const Check& check) {
   sim::World world = check.truth;
   world.room = {};
   std::erase_if(world.objects, [](const sim::Object& object) { return object.name != "prototype"; });
@@ -22,12 +22,12 @@ sim::World staged(const Check& check) {
 
 }  // namespace
 
-CheckRun::CheckRun(const Check& check) : check_(check), world_(staged(check)) {
+CheckRun::CheckRun(const Check& check) : check_(check), world_(reduced_world(check)) {
   for (const CheckLimit& limit : check.limits) asked_.insert(limit.measure.name);
 }
 
 Status CheckRun::open() {
-  LIMN_TRY(renderer_, projector::Renderer::create(check_.told.scene, check_.told.rig));
+  LIMN_TRY(renderer_, projector::Renderer::create(check_.renderer_input.scene, check_.renderer_input.rig));
   return {};
 }
 
@@ -36,63 +36,65 @@ Error CheckRun::nothing_to_judge(const std::string& measure, const std::string& 
                expected);
 }
 
-std::vector<cv::Mat> CheckRun::drawn_by(projector::Renderer& renderer, const scene::PosedScene& posed) const {
+std::vector<cv::Mat> CheckRun::projector_images_by(projector::Renderer& renderer,
+                                                   const scene::PosedScene& posed) const {
   std::vector<cv::Mat> images;
-  for (std::size_t i = 0; i < check_.told.rig.projectors.size(); ++i)
+  for (std::size_t i = 0; i < check_.renderer_input.rig.projectors.size(); ++i)
     images.push_back(renderer.projector_image(i, posed, check_.viewer));
   return images;
 }
 
 const std::vector<cv::Mat>& CheckRun::projector_images() {
-  if (projector_images_.empty()) projector_images_ = drawn_by(*renderer_, check_.told.posed);
+  if (projector_images_.empty())
+    projector_images_ = projector_images_by(*renderer_, check_.renderer_input.posed);
   return projector_images_;
 }
 
-const std::vector<sim::PartImage>& CheckRun::aims() {
-  if (aims_.empty())
+const std::vector<sim::PartImage>& CheckRun::reference_projector_images() {
+  if (reference_projector_images_.empty())
     for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
-      aims_.push_back(reference().projector_image(i));
-  return aims_;
+      reference_projector_images_.push_back(reference().projector_image(i));
+  return reference_projector_images_;
 }
 
-const ReferenceView& CheckRun::eye() {
-  if (!eye_) eye_.emplace(world_, check_.viewer, 1);
-  return *eye_;
+const ReferenceView& CheckRun::reference_view() {
+  if (!reference_view_) reference_view_.emplace(world_, check_.viewer, 1);
+  return *reference_view_;
 }
 
-const ReferenceView& CheckRun::fine_eye() {
-  if (!fine_eye_) {
-    fine_eye_.emplace(world_, check_.viewer, k_finer);
-    fine_reaches_ = fine_eye_->reaches();
+const ReferenceView& CheckRun::fine_reference_view() {
+  if (!fine_reference_view_) {
+    fine_reference_view_.emplace(world_, check_.viewer, k_finer);
+    fine_reaches_ = fine_reference_view_->reaches();
   }
-  return *fine_eye_;
+  return *fine_reference_view_;
 }
 
 const std::vector<cv::Mat>& CheckRun::fine_reaches() {
-  fine_eye();
+  fine_reference_view();
   return fine_reaches_;
 }
 
-std::pair<scene::Scene, scene::PosedScene> CheckRun::shown_instead(const scene::Mesh& mesh,
-                                                                   scene::Mode mode) const {
-  scene::Scene scene = check_.told.scene;
+std::pair<scene::Scene, scene::PosedScene> CheckRun::scene_with_mesh(const scene::Mesh& mesh,
+                                                                     scene::Mode mode) const {
+  scene::Scene scene = check_.renderer_input.scene;
   scene::Slot slot;
   slot.name = "judged";
   slot.mode = mode;
   slot.variants = {{"judged", mesh}};
   scene.slots = {slot};
-  const Pose& world_from_prototype = *check_.told.posed.world_from_prototype;
+  const Pose& world_from_prototype = *check_.renderer_input.posed.world_from_prototype;
   return {scene, {world_from_prototype, {{"judged", "judged", world_from_prototype}}}};
 }
 
-Result<std::vector<cv::Mat>> CheckRun::drawn_instead(const scene::Mesh& mesh, scene::Mode mode) const {
-  const auto [scene, posed] = shown_instead(mesh, mode);
-  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, check_.told.rig));
-  return drawn_by(renderer, posed);
+Result<std::vector<cv::Mat>> CheckRun::projector_images_of(const scene::Mesh& mesh, scene::Mode mode) const {
+  const auto [scene, posed] = scene_with_mesh(mesh, mode);
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, check_.renderer_input.rig));
+  return projector_images_by(renderer, posed);
 }
 
 scene::Mesh CheckRun::coat() const {
-  scene::Mesh coat = check_.told.scene.prototype->mesh;
+  scene::Mesh coat = check_.renderer_input.scene.prototype->mesh;
   coat.materials = {
       scene::Material{.base_colour = Eigen::Vector3f::Constant(float(k_coat)), .unlit = true, .texture = {}}};
   coat.triangle_materials.assign(coat.triangles.size(), 0);
@@ -101,8 +103,8 @@ scene::Mesh CheckRun::coat() const {
 }
 
 Result<const Imager*> CheckRun::camera(const std::string& measure) const {
-  if (check_.told.rig.cameras.empty()) return nothing_to_judge(measure, "a camera in the world");
-  return &check_.told.rig.cameras.front();
+  if (check_.renderer_input.rig.cameras.empty()) return nothing_to_judge(measure, "a camera in the world");
+  return &check_.renderer_input.rig.cameras.front();
 }
 
 CheckResult CheckRun::result() && {

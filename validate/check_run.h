@@ -33,25 +33,26 @@ class CheckRun {
   bool asks_for(const std::string& measure) const { return asked_.contains(measure); }
 
   /// The projector images that this renderer draws for the check's viewer.
-  std::vector<cv::Mat> drawn_by(projector::Renderer& renderer, const scene::PosedScene& posed) const;
+  std::vector<cv::Mat> projector_images_by(projector::Renderer& renderer,
+                                           const scene::PosedScene& posed) const;
   /// The projector images of the check's parts.
   const std::vector<cv::Mat>& projector_images();
   /// The scene's prototype with this mesh as its only part, and the poses of both.
-  std::pair<scene::Scene, scene::PosedScene> shown_instead(const scene::Mesh& mesh, scene::Mode mode) const;
-  /// The projector images of shown_instead(), drawn by a renderer of its own.
-  Result<std::vector<cv::Mat>> drawn_instead(const scene::Mesh& mesh, scene::Mode mode) const;
+  std::pair<scene::Scene, scene::PosedScene> scene_with_mesh(const scene::Mesh& mesh, scene::Mode mode) const;
+  /// The projector images of scene_with_mesh(), drawn by a renderer of its own.
+  Result<std::vector<cv::Mat>> projector_images_of(const scene::Mesh& mesh, scene::Mode mode) const;
   /// The prototype's mesh with a uniform material that emits even light.
   scene::Mesh coat() const;
 
   /// The ray tracer's renderer of the check's parts.
   sim::ReferenceRenderer reference() const { return {world_, check_.posed, check_.viewer}; }
   /// The ray-traced images of the projectors.
-  const std::vector<sim::PartImage>& aims();
+  const std::vector<sim::PartImage>& reference_projector_images();
   /// The view from the viewpoint.
-  const ReferenceView& eye();
+  const ReferenceView& reference_view();
   /// The same view with k_finer x k_finer rays per pixel, for measures of even light.
-  const ReferenceView& fine_eye();
-  /// The share of each pixel of fine_eye() that each projector reaches.
+  const ReferenceView& fine_reference_view();
+  /// The share of each pixel of fine_reference_view() that each projector reaches.
   const std::vector<cv::Mat>& fine_reaches();
 
   /// Camera 0 as the renderer knows it. Error: the world has none.
@@ -71,8 +72,8 @@ class CheckRun {
   std::set<std::string> asked_;
   std::optional<projector::Renderer> renderer_;
   std::vector<cv::Mat> projector_images_;
-  std::vector<sim::PartImage> aims_;
-  std::optional<ReferenceView> eye_, fine_eye_;
+  std::vector<sim::PartImage> reference_projector_images_;
+  std::optional<ReferenceView> reference_view_, fine_reference_view_;
   std::vector<cv::Mat> fine_reaches_;
   std::map<std::string, double> values_;
   std::vector<CheckImage> images_;

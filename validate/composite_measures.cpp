@@ -32,11 +32,11 @@ cv::Mat light_meets_screen(CheckRun& run, const Imager& camera, const cv::Mat& c
   cv::Mat meets(camera.height, camera.width, CV_8U, cv::Scalar(0));
   for (std::size_t i = 0; i < run.check().posed.parts.size(); ++i) {
     const cv::Mat mask = masks.part_mask(camera, run.check().posed.parts[i].slot);
-    cv::Mat lit, left, inner;
-    cv::dilate(mask == 255, lit, near);
-    cv::dilate(mask == 128, left, near);
+    cv::Mat near_light, near_screen, inner;
+    cv::dilate(mask == 255, near_light, near);
+    cv::dilate(mask == 128, near_screen, near);
     cv::erode((front == static_cast<int>(i)) & (cover > k_whole), inner, inner_of);
-    meets |= lit & left & inner;
+    meets |= near_light & near_screen & inner;
   }
   return meets;
 }
@@ -47,10 +47,10 @@ Status judge_drawn(CheckRun& run) {
   LIMN_TRY(const Imager* camera, run.camera("drawn_…"));
   const cv::Mat black(camera->height, camera->width, CV_8UC3, cv::Scalar::all(0));
   const cv::Mat actual =
-      run.renderer().composite(0, black, run.check().told.posed, projector::Composite::full);
-  const sim::PartImage seen = run.reference().parts_image(run.world().rig.cameras.front());
-  const cv::Mat expected = eye_image(seen.light);
-  const cv::Mat shown = any_channel_over(actual, 0) | (seen.cover > 0);
+      run.renderer().composite(0, black, run.check().renderer_input.posed, projector::Composite::full);
+  const sim::PartImage reference = run.reference().parts_image(run.world().rig.cameras.front());
+  const cv::Mat expected = srgb_image(reference.light);
+  const cv::Mat shown = any_channel_over(actual, 0) | (reference.cover > 0);
   if (cv::countNonZero(shown) == 0) return run.nothing_to_judge("drawn_…", "a part in camera 0's image");
   cv::Mat off, levels, expected_levels;
   cv::absdiff(actual, expected, off);
@@ -68,7 +68,7 @@ Status judge_drawn(CheckRun& run) {
 Status judge_mask(CheckRun& run) {
   cv::Mat found(run.check().viewer.height, run.check().viewer.width, CV_8U, cv::Scalar(0)),
       truth = found.clone();
-  for (const auto& part : run.renderer().coverage(run.check().told.posed, run.check().viewer))
+  for (const auto& part : run.renderer().coverage(run.check().renderer_input.posed, run.check().viewer))
     part.mask.copyTo(found, part.mask != 0);
   const cv::Mat front = run.reference().depth_order(run.check().viewer).front;
   const sim::Truth masks(run.world(), run.check().posed);
@@ -88,7 +88,7 @@ Status judge_composite(CheckRun& run) {
   const Imager doubled = resized(*camera, 2 * camera->width, 2 * camera->height).value();
   const Imager true_doubled =
       resized(run.world().rig.cameras.front(), 2 * camera->width, 2 * camera->height).value();
-  const cv::Mat found = front_of(run.renderer().coverage(run.check().told.posed, doubled), doubled);
+  const cv::Mat found = front_of(run.renderer().coverage(run.check().renderer_input.posed, doubled), doubled);
   const cv::Mat truth = run.reference().depth_order(true_doubled).front;
   double worst_px = -1;
   std::string caption = "At twice the resolution.";
@@ -118,12 +118,13 @@ Status judge_edge(CheckRun& run) {
   if (cv::countNonZero(meets) == 0)
     return run.nothing_to_judge("edge_…", "a part in camera 0's image that is half on, half off the surface");
   std::vector<cv::Mat> images;
-  for (std::size_t i = 0; i < run.check().told.rig.projectors.size(); ++i)
-    images.push_back(run.renderer().projector_image(i, run.check().told.posed, *camera));
-  const cv::Mat by_light = eye_image(ReferenceView(run.world(), true_camera, k_finer).seen(images));
+  for (std::size_t i = 0; i < run.check().renderer_input.rig.projectors.size(); ++i)
+    images.push_back(run.renderer().projector_image(i, run.check().renderer_input.posed, *camera));
+  const cv::Mat by_light =
+      srgb_image(ReferenceView(run.world(), true_camera, k_finer).rendered_light(images));
   const cv::Mat together =
-      run.renderer().composite(0, by_light, run.check().told.posed, projector::Composite::rest);
-  const cv::Mat expected = eye_image(parts.light), gap = missing_luminance(expected, together),
+      run.renderer().composite(0, by_light, run.check().renderer_input.posed, projector::Composite::rest);
+  const cv::Mat expected = srgb_image(parts.light), gap = missing_luminance(expected, together),
                 twice = missing_luminance(together, expected);
   run.set("edge_gap_share", p95_within(gap, meets));
   run.set("edge_double_share", p95_within(twice, meets));
@@ -141,7 +142,7 @@ Status judge_edge(CheckRun& run) {
 
 Status judge_depth_order(CheckRun& run) {
   LIMN_TRY(const Imager* camera, run.camera("depth_order_share"));
-  const cv::Mat found = front_of(run.renderer().coverage(run.check().told.posed, *camera), *camera);
+  const cv::Mat found = front_of(run.renderer().coverage(run.check().renderer_input.posed, *camera), *camera);
   const sim::DepthOrder truth = run.reference().depth_order(run.world().rig.cameras.front());
   const int contested = cv::countNonZero(truth.contested);
   if (contested == 0)

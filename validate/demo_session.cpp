@@ -44,12 +44,12 @@ constexpr double k_max_held_out_px = 0.40;
 
 // Where the designer stands, in the door's frame (x right, y up, z towards the viewer): first behind the
 // camera, then two steps to the left.
-const Eigen::Vector3d k_p_eye(0.03, 0.32, 1.62);
-const Eigen::Vector3d k_p_eye_left(-0.75, 0.35, 1.15);
+const Eigen::Vector3d k_p_designer(0.03, 0.32, 1.62);
+const Eigen::Vector3d k_p_designer_left(-0.75, 0.35, 1.15);
 const Eigen::Vector3d k_p_gaze(-0.04, 0.02, 0.0);
 
 // The seconds that each step takes, in order.
-class Stages {
+class PhaseTimes {
  public:
   template <class Work>
   auto time(const std::string& name, Work work) {
@@ -93,8 +93,8 @@ struct Moment {
   scene::PosedScene posed;
 };
 
-Imager designers_eye(const Pose& world_from_prototype, const Eigen::Vector3d& p_eye = k_p_eye) {
-  const Pose viewer_from_prototype = looking_at(p_eye, k_p_gaze, Eigen::Vector3d::UnitY());
+Imager designer_viewer(const Pose& world_from_prototype, const Eigen::Vector3d& p_viewer = k_p_designer) {
+  const Pose viewer_from_prototype = looking_at(p_viewer, k_p_gaze, Eigen::Vector3d::UnitY());
   return viewer_imager(world_from_prototype * viewer_from_prototype.inverse(), k_viewer_width,
                        k_viewer_height, k_viewer_fov_deg);
 }
@@ -105,7 +105,9 @@ Result<cv::Mat> photograph(sim::VirtualRig* room) {
 }
 
 // Photographs the room without projected light and finds everything in the image.
-Result<Moment> looked(Session* session, sim::VirtualRig* room, const std::vector<std::string>& variants) {
+Result<Moment> tracked_moment(Session* session,
+                              sim::VirtualRig* room,
+                              const std::vector<std::string>& variants) {
   room->darken();
   Moment moment;
   LIMN_TRY(const Frame frame, room->camera(0).next());
@@ -142,20 +144,21 @@ std::vector<cv::Mat> drawn(projector::Renderer* renderer,
 // A photograph of the room while these images are projected.
 Result<cv::Mat> shone(sim::VirtualRig* room, const std::vector<cv::Mat>& images) {
   for (std::size_t i = 0; i < images.size(); ++i) {
-    if (auto shown = room->projector(static_cast<int>(i)).show(images[i]); !shown) return shown.error();
+    if (auto shown_at = room->projector(static_cast<int>(i)).show(images[i]); !shown_at)
+      return shown_at.error();
   }
   return photograph(room);
 }
 
 // The room from another viewpoint while these images are projected: a simulated photograph.
-cv::Mat seen_from(const sim::World& world, const Imager& eye, const std::vector<cv::Mat>& images) {
-  sim::World seen = world;
-  seen.rig.cameras = {eye};
-  return sim::photograph(seen, sim::trace(seen, 0), images, world.seed);
+cv::Mat photographed_from(const sim::World& world, const Imager& viewer, const std::vector<cv::Mat>& images) {
+  sim::World world_of_viewer = world;
+  world_of_viewer.rig.cameras = {viewer};
+  return sim::photograph(world_of_viewer, sim::trace(world_of_viewer, 0), images, world.seed);
 }
 
-// A renderer of the aimed dots instead of the scene's parts, on the same prototype.
-Result<projector::Renderer> dots_renderer(const Session& session, const AimedDots& dots) {
+// A renderer of the target dots instead of the scene's parts, on the same prototype.
+Result<projector::Renderer> dots_renderer(const Session& session, const TargetDots& dots) {
   scene::Scene scene = session.scene;
   scene::Slot slot;
   slot.name = "dots";
@@ -166,18 +169,18 @@ Result<projector::Renderer> dots_renderer(const Session& session, const AimedDot
 }
 
 struct JudgedDots {
-  AimedDots dots;
+  TargetDots dots;
   Registration registration;
 };
 
 // Compares the light of the calibrated rig with the ground truth, with the door where the tracker says it is.
 Result<JudgedDots> judged(const Session& session, const sim::World& world, const Moment& moment) {
-  const AimedDots dots = aimed_dots(world, k_judged_points, k_judged_seed);
+  const TargetDots dots = target_dots(world, k_judged_points, k_judged_seed);
   LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
   const Pose& world_from_prototype = *moment.posed.world_from_prototype;
   const scene::PosedScene posed{world_from_prototype, {{"dots", "dots", world_from_prototype}}};
   const auto images =
-      drawn(&renderer, session.rig.projectors.size(), posed, designers_eye(world_from_prototype));
+      drawn(&renderer, session.rig.projectors.size(), posed, designer_viewer(world_from_prototype));
   return JudgedDots{dots, judged_registration(world, dots, images)};
 }
 
@@ -215,8 +218,8 @@ double composite_error_px(Session* session,
 cv::Mat error_map(const cv::Mat& photograph, const sim::World& world, const JudgedDots& judged) {
   const auto& [dots, found] = judged;
   cv::Mat map = photograph / 3;
-  for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
-    const auto px = world.rig.cameras[0].project(world.world_from_prototype * dots.p_aimed[i]);
+  for (std::size_t i = 0; i < dots.p_targets.size(); ++i) {
+    const auto px = world.rig.cameras[0].project(world.world_from_prototype * dots.p_targets[i]);
     if (!px) continue;
     const double share =
         std::min(1.0, found.errors_mm[i] / k_max_registration_mm);  // green to red at the limit
@@ -237,11 +240,11 @@ Result<Place> judged_place(const std::string& name,
                            const Pose& world_from_prototype,
                            Session* session,
                            sim::VirtualRig* room,
-                           Stages* stages) {
+                           PhaseTimes* phases) {
   room->move("prototype", world_from_prototype);
-  LIMN_TRY(Moment moment, stages->time("track", [&] { return looked(session, room, {}); }));
+  LIMN_TRY(Moment moment, phases->time("track", [&] { return tracked_moment(session, room, {}); }));
   LIMN_TRY(JudgedDots judged_dots,
-           stages->time("judge", [&] { return judged(*session, room->world(), moment); }));
+           phases->time("judge", [&] { return judged(*session, room->world(), moment); }));
   return Place{name, std::move(moment), std::move(judged_dots)};
 }
 
@@ -256,16 +259,19 @@ std::vector<std::pair<std::string, Pose>> places_of(const Pose& world_from_proto
 }
 
 // Captures and calibrates, and sets up the session with the calibrated rig.
-Result<Session> calibrated(const fs::path& out, sim::VirtualRig* room, Stages* stages, bool keep_captures) {
+Result<Session> calibrated(const fs::path& out,
+                           sim::VirtualRig* room,
+                           PhaseTimes* phases,
+                           bool keep_captures) {
   const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
   std::error_code ignored;
   fs::remove_all(captures, ignored);
   LIMN_TRY(const Plan plan, load_plan(fs::path(LIMN_SOURCE_DIR) / "config/plans/studio.json"));
-  LIMN_TRY_STATUS(stages->time("capture", [&] { return capture_virtually(plan, room, captures); }));
+  LIMN_TRY_STATUS(phases->time("capture", [&] { return capture_virtually(plan, room, captures); }));
   SolveCommandOptions solving;
   solving.captures = captures;
   solving.out = rig_folder;
-  LIMN_TRY(const calib::Report report, stages->time("solve", [&] { return solved(solving); }));
+  LIMN_TRY(const calib::Report report, phases->time("solve", [&] { return solved(solving); }));
   if (!keep_captures) fs::remove_all(captures, ignored);
   const Rig& rig = report.solution.rig;
   scene::Scene scene = room->world().scene.value();
@@ -343,67 +349,69 @@ nlohmann::ordered_json json_of(const Measurement& measured) {
 }
 
 // Images for people: what the renderer draws and what the simulator photographs.
-Result<std::vector<DemoImage>> shown_session(Session* session, sim::VirtualRig* room, const Place& place) {
+Result<std::vector<DemoImage>> session_images(Session* session, sim::VirtualRig* room, const Place& place) {
   const scene::PosedScene& posed = place.moment.posed;
   const Pose& world_from_prototype = *posed.world_from_prototype;
-  const Imager eye = designers_eye(world_from_prototype);
-  const Imager eye_left = designers_eye(world_from_prototype, k_p_eye_left);
-  const Imager true_eye_left = designers_eye(room->world().world_from_prototype, k_p_eye_left);
+  const Imager viewer = designer_viewer(world_from_prototype);
+  const Imager viewer_left = designer_viewer(world_from_prototype, k_p_designer_left);
+  const Imager true_viewer_left = designer_viewer(room->world().world_from_prototype, k_p_designer_left);
   const std::size_t projector_count = session->rig.projectors.size();
   projector::Renderer& renderer = session->renderer;
 
   const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
-  LIMN_TRY(const Moment swapped, looked(session, room, {other_variant}));
+  LIMN_TRY(const Moment swapped, tracked_moment(session, room, {other_variant}));
   LIMN_TRY_STATUS(renderer.set_contact_shadow(&session->scene));
   room->camera_effects(0).srgb = true;  // sRGB for people; measurements use linear images
   LIMN_TRY(const cv::Mat unlit, shone(room, {}));
-  const auto images = drawn(&renderer, projector_count, posed, eye);
-  LIMN_TRY(const cv::Mat lit, shone(room, images));
-  const auto images_swapped = drawn(&renderer, projector_count, swapped.posed, eye);
-  LIMN_TRY(const cv::Mat lit_swapped, shone(room, images_swapped));
-  const auto images_left = drawn(&renderer, projector_count, posed, eye_left);
+  const auto images = drawn(&renderer, projector_count, posed, viewer);
+  LIMN_TRY(const cv::Mat illuminated, shone(room, images));
+  const auto images_swapped = drawn(&renderer, projector_count, swapped.posed, viewer);
+  LIMN_TRY(const cv::Mat illuminated_swapped, shone(room, images_swapped));
+  const auto images_left = drawn(&renderer, projector_count, posed, viewer_left);
 
   using projector::Composite;
-  std::vector<DemoImage> shown = {
+  std::vector<DemoImage> demo_images = {
       {"unlit", "The room without projected light",
        "A simulated photograph: a clay door, its markers, the room's own light.", unlit},
       {"lit", "Lit", "The same with the projectors' light: trim line and mirror are projected onto the door.",
-       lit},
+       illuminated},
       {"composite", "On the screen",
        "Camera image plus what light cannot show: the part of the mirror beyond the door.",
-       renderer.composite(0, lit, posed, Composite::rest)},
+       renderer.composite(0, illuminated, posed, Composite::rest)},
       {"composite-full", "The whole parts on the screen",
        "Drawn over the photograph without projected light.",
        renderer.composite(0, unlit, posed, Composite::full)}};
   for (std::size_t i = 0; i < projector_count; ++i) {
     const std::string& name = session->rig.projectors[i].name;
-    shown.push_back({name, name, "The image for this projector.", images[i]});
+    demo_images.push_back({name, name, "The image for this projector.", images[i]});
   }
-  shown.push_back(
+  demo_images.push_back(
       {"error-map", "Error map",
        fmt::format(
            "Each dot is projected light, measured by the ray tracer: green is 0, red is {} mm or more.",
            k_max_registration_mm),
        error_map(unlit, room->world(), place.judged)});
-  shown.push_back({"composite-swapped", "Another mirror",
-                   "After the variant was changed, light and screen show the new mirror.",
-                   renderer.composite(0, lit_swapped, swapped.posed, Composite::rest)});
-  shown.push_back({"from-the-left", "From the left",
-                   "The designer has walked to the left: the mirror is projected for the new viewpoint and "
-                   "seems to stand out from the door.",
-                   seen_from(room->world(), true_eye_left, images_left)});
-  shown.push_back({"mask", "Mask",
-                   "From the designer's viewpoint: white is projected, grey is left to the screen.",
-                   merged_masks(renderer.coverage(posed, eye), {eye.width, eye.height})});
-  return shown;
+  demo_images.push_back({"composite-swapped", "Another mirror",
+                         "After the variant was changed, light and screen show the new mirror.",
+                         renderer.composite(0, illuminated_swapped, swapped.posed, Composite::rest)});
+  demo_images.push_back(
+      {"from-the-left", "From the left",
+       "The designer has walked to the left: the mirror is projected for the new viewpoint and "
+       "seems to stand out from the door.",
+       photographed_from(room->world(), true_viewer_left, images_left)});
+  demo_images.push_back({"mask", "Mask",
+                         "From the designer's viewpoint: white is projected, grey is left to the screen.",
+                         merged_masks(renderer.coverage(posed, viewer), {viewer.width, viewer.height})});
+  return demo_images;
 }
 
 // Overlap of the masks from the designer's viewpoint with the ray-traced ones.
 double mask_iou(Session* session, const sim::World& world, const sim::Truth& truth, const Moment& moment) {
-  const Imager eye = designers_eye(*moment.posed.world_from_prototype);
-  const cv::Mat found = merged_masks(session->renderer.coverage(moment.posed, eye), {eye.width, eye.height});
-  const Imager true_eye = designers_eye(world.world_from_prototype);
-  return label_iou(found, merged_true_masks(truth, session->scene, true_eye));
+  const Imager viewer = designer_viewer(*moment.posed.world_from_prototype);
+  const cv::Mat found =
+      merged_masks(session->renderer.coverage(moment.posed, viewer), {viewer.width, viewer.height});
+  const Imager true_viewer = designer_viewer(world.world_from_prototype);
+  return label_iou(found, merged_true_masks(truth, session->scene, true_viewer));
 }
 
 }  // namespace
@@ -412,13 +420,13 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   LIMN_TRY(sim::World world,
            sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image));
   sim::VirtualRig room(std::move(world));
-  Stages stages;
-  LIMN_TRY(Session session, calibrated(out, &room, &stages, keep_captures));
+  PhaseTimes phases;
+  LIMN_TRY(Session session, calibrated(out, &room, &phases, keep_captures));
   Measurement measured;
   measured.held_out_px = session.held_out_px;
   const Pose in_place = room.world().world_from_prototype;
   for (const auto& [name, world_from_prototype] : places_of(in_place)) {
-    LIMN_TRY(Place place, judged_place(name, world_from_prototype, &session, &room, &stages));
+    LIMN_TRY(Place place, judged_place(name, world_from_prototype, &session, &room, &phases));
     measured.places.push_back(std::move(place));
   }
   room.move("prototype", in_place);
@@ -426,11 +434,11 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   const sim::World& truth_world = room.world();
   const sim::Truth truth(truth_world, sim::true_poses(truth_world));
   measured.composite_px =
-      stages.time("judge", [&] { return composite_error_px(&session, truth_world, truth, moment); });
-  measured.mask_iou = stages.time("judge", [&] { return mask_iou(&session, truth_world, truth, moment); });
+      phases.time("judge", [&] { return composite_error_px(&session, truth_world, truth, moment); });
+  measured.mask_iou = phases.time("judge", [&] { return mask_iou(&session, truth_world, truth, moment); });
   LIMN_TRY(auto images,
-           stages.time("render", [&] { return shown_session(&session, &room, measured.places.front()); }));
-  measured.seconds = stages.seconds();
+           phases.time("render", [&] { return session_images(&session, &room, measured.places.front()); }));
+  measured.seconds = phases.seconds();
   return DemoResult{rows_of(measured), json_of(measured).dump(2) + "\n", std::move(images)};
 }
 

@@ -14,12 +14,12 @@ constexpr float k_same_reach =
 std::pair<cv::Mat, cv::Mat> bounds_of_light(CheckRun& run) {
   cv::Mat low(run.check().viewer.height, run.check().viewer.width, CV_32FC3, cv::Scalar::all(0)),
       high = low.clone();
-  const std::vector<cv::Mat> reaches = run.eye().reaches();
+  const std::vector<cv::Mat> reaches = run.reference_view().reaches();
   cv::Mat best = reaches[0].clone();
   for (const cv::Mat& reach : reaches) best = cv::max(best, reach);
   cv::Mat begun(low.size(), CV_8U, cv::Scalar(0));
   for (std::size_t i = 0; i < reaches.size(); ++i) {
-    const cv::Mat alone = run.eye().seen(i, run.aims()[i].light);
+    const cv::Mat alone = run.reference_view().rendered_light(i, run.reference_projector_images()[i].light);
     const cv::Mat candidate = (reaches[i] > 0) & (reaches[i] >= best - k_same_reach);
     cv::Mat(cv::min(low, alone)).copyTo(low, candidate & begun);
     cv::Mat(cv::max(high, alone)).copyTo(high, candidate & begun);
@@ -33,38 +33,38 @@ std::pair<cv::Mat, cv::Mat> bounds_of_light(CheckRun& run) {
 }  // namespace
 
 Status judge_shone(CheckRun& run) {
-  const cv::Mat actual = run.eye().seen(run.projector_images());
+  const cv::Mat actual = run.reference_view().rendered_light(run.projector_images());
   const auto [low, high] = bounds_of_light(run);
-  const cv::Mat lit = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
-  if (cv::countNonZero(lit) == 0)
+  const cv::Mat illuminated = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
+  if (cv::countNonZero(illuminated) == 0)
     return run.nothing_to_judge("shone_…", "a part on the prototype in the viewer's image");
   const cv::Mat below = low - actual, above = actual - high;
   cv::Mat off = cv::max(below, above);
   off = cv::max(off, 0.0);
   const cv::Mat expected = (low + high) / 2;
-  const LevelErrors errors = level_errors(off * 255, expected * 255, lit);
+  const LevelErrors errors = level_errors(off * 255, expected * 255, illuminated);
   run.set("shone_mean_255", errors.mean);
   run.set("shone_over4_share", errors.over);
   run.set("shone_inner_over4_share", errors.inner_over);
-  run.add({"shone", "Light on the prototype, from the viewpoint", level_errors_caption(errors, lit),
-           eye_image(actual), eye_image(expected), amplified(off)});
+  run.add({"shone", "Light on the prototype, from the viewpoint", level_errors_caption(errors, illuminated),
+           srgb_image(actual), srgb_image(expected), amplified(off)});
   return {};
 }
 
 Status judge_spill(CheckRun& run) {
   double spilt = 0, all = 0;
-  for (std::size_t i = 0; i < run.aims().size(); ++i) {
+  for (std::size_t i = 0; i < run.reference_projector_images().size(); ++i) {
     const cv::Mat light = linear_light(run.projector_images()[i]);
     cv::Mat forbidden = light.clone();
-    forbidden.setTo(0, run.aims()[i].cover > 0);
+    forbidden.setTo(0, run.reference_projector_images()[i].cover > 0);
     const cv::Scalar sum = cv::sum(light), lost = cv::sum(forbidden);
     all += sum[0] + sum[1] + sum[2];
     spilt += lost[0] + lost[1] + lost[2];
-    const std::string& name = run.check().told.rig.projectors[i].name;
+    const std::string& name = run.check().renderer_input.rig.projectors[i].name;
     run.add({"spill-" + name, "Light of " + name,
              "Expected: this projector alone, before light is shared. Difference: light where no part needs "
              "it, amplified 32 times.",
-             eye_image(light), eye_image(run.aims()[i].light), amplified(forbidden)});
+             srgb_image(light), srgb_image(run.reference_projector_images()[i].light), amplified(forbidden)});
   }
   if (all == 0) return run.nothing_to_judge("spill_share", "light");
   run.set("spill_share", spilt / all);

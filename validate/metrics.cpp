@@ -22,7 +22,7 @@ constexpr double k_floating_spacing_m = 0.012;  // the surface's slant stretches
 constexpr double k_free_radius_m = 0.0026;      // the disc's light with the fringe of its projector pixels
 constexpr double k_floating_free_radius_m = 0.0045;
 // Cosine between line of sight and normal of the surface behind a floating disc; it limits the stretching.
-constexpr double k_min_sight_cosine = 0.6;
+constexpr double k_min_view_cosine = 0.6;
 constexpr double k_flat_m = 0.001;  // largest distance of the surface from a dot's plane there
 constexpr int k_dot_corners = 12;
 constexpr int k_tries_per_dot = 30;  // random points, to place dots as close as their spacing allows
@@ -140,8 +140,8 @@ void append_disc(const sim::SampledPoint& sample, scene::Mesh* mesh) {
   }
 }
 
-AimedDots no_dots(double spacing_m) {
-  AimedDots dots;
+TargetDots no_dots(double spacing_m) {
+  TargetDots dots;
   dots.mesh.materials = {scene::Material{.base_colour = {1, 1, 1}, .unlit = true, .texture = {}}};
   dots.spacing_m = spacing_m;
   return dots;
@@ -149,10 +149,10 @@ AimedDots no_dots(double spacing_m) {
 
 // The point of the prototype that the viewer sees in the direction of p (both in the prototype's frame), if
 // any.
-std::optional<sim::SampledPoint> seen_behind(const sim::World& world,
-                                             const sim::Truth& truth,
-                                             const Imager& viewer,
-                                             const Eigen::Vector3d& p) {
+std::optional<sim::SampledPoint> surface_behind(const sim::World& world,
+                                                const sim::Truth& truth,
+                                                const Imager& viewer,
+                                                const Eigen::Vector3d& p) {
   const auto px = viewer.project(world.world_from_prototype * p);
   const auto landing = px ? truth.landing(viewer, *px) : std::nullopt;
   if (!landing || landing->object != "prototype") return std::nullopt;
@@ -162,10 +162,10 @@ std::optional<sim::SampledPoint> seen_behind(const sim::World& world,
 
 // The point that counts when light of a dot lands at p: p itself, or for floating discs p as seen from the
 // viewpoint in the disc's plane.
-Eigen::Vector3d place_of(const AimedDots& dots, std::size_t dot, const Eigen::Vector3d& p) {
+Eigen::Vector3d place_of(const TargetDots& dots, std::size_t dot, const Eigen::Vector3d& p) {
   if (dots.p_centres.empty()) return p;
-  const Eigen::Vector3d n = dots.p_eye - dots.p_centres[dot], d = p - dots.p_eye;
-  return dots.p_eye - d * (n.squaredNorm() / n.dot(d));
+  const Eigen::Vector3d n = dots.p_viewpoint - dots.p_centres[dot], d = p - dots.p_viewpoint;
+  return dots.p_viewpoint - d * (n.squaredNorm() / n.dot(d));
 }
 
 cv::Mat outline(const cv::Mat& mask) {
@@ -187,60 +187,60 @@ std::pair<double, int> squared_distances(const cv::Mat& from, const cv::Mat& to)
 
 }  // namespace
 
-AimedDots floating_dots(
+TargetDots floating_dots(
     const sim::World& world, const Imager& viewer, double height_m, int count, std::uint64_t seed) {
   const sim::Truth truth(world);
-  AimedDots dots = no_dots(k_floating_spacing_m);
-  dots.p_eye = world.world_from_prototype.inverse() * viewer.imager_from_world.inverse().translation;
-  NearestPoints taken(&dots.p_aimed, k_floating_spacing_m);
+  TargetDots dots = no_dots(k_floating_spacing_m);
+  dots.p_viewpoint = world.world_from_prototype.inverse() * viewer.imager_from_world.inverse().translation;
+  NearestPoints chosen(&dots.p_targets, k_floating_spacing_m);
   for (const sim::SampledPoint& sample :
        sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
-    if (static_cast<int>(dots.p_aimed.size()) == count) break;
+    if (static_cast<int>(dots.p_targets.size()) == count) break;
     const Eigen::Vector3d p_centre = sample.p + height_m * sample.n;
-    const auto behind = seen_behind(world, truth, viewer, p_centre);
-    if (!behind || (behind->p - dots.p_eye).norm() < (p_centre - dots.p_eye).norm()) continue;
-    if (behind->n.dot((dots.p_eye - behind->p).normalized()) < k_min_sight_cosine) continue;
-    if (taken.nearest(behind->p, k_floating_spacing_m)) continue;
-    const sim::SampledPoint disc{p_centre, (dots.p_eye - p_centre).normalized()};
+    const auto behind = surface_behind(world, truth, viewer, p_centre);
+    if (!behind || (behind->p - dots.p_viewpoint).norm() < (p_centre - dots.p_viewpoint).norm()) continue;
+    if (behind->n.dot((dots.p_viewpoint - behind->p).normalized()) < k_min_view_cosine) continue;
+    if (chosen.nearest(behind->p, k_floating_spacing_m)) continue;
+    const sim::SampledPoint disc{p_centre, (dots.p_viewpoint - p_centre).normalized()};
     const auto corners = rim(disc, k_floating_free_radius_m);
     const bool whole = std::all_of(corners.begin(), corners.end(), [&](const Eigen::Vector3d& corner) {
-      const auto beside = seen_behind(world, truth, viewer, corner);
+      const auto beside = surface_behind(world, truth, viewer, corner);
       return beside && (beside->p - behind->p).norm() < k_floating_spacing_m;
     });
     if (!whole || !reached(world, truth, *behind, k_floating_free_radius_m)) continue;
-    dots.p_aimed.push_back(behind->p);
+    dots.p_targets.push_back(behind->p);
     dots.p_centres.push_back(p_centre);
-    taken.add(dots.p_aimed.size() - 1);
+    chosen.add(dots.p_targets.size() - 1);
     append_disc(disc, &dots.mesh);
   }
   return dots;
 }
 
-AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed) {
+TargetDots target_dots(const sim::World& world, int count, std::uint64_t seed) {
   const sim::Truth truth(world);
-  AimedDots dots = no_dots(k_dot_spacing_m);
-  NearestPoints taken(&dots.p_aimed, k_dot_spacing_m);
+  TargetDots dots = no_dots(k_dot_spacing_m);
+  NearestPoints chosen(&dots.p_targets, k_dot_spacing_m);
   for (const sim::SampledPoint& sample :
        sim::surface_points(prototype_mesh(world), k_tries_per_dot * count, seed)) {
-    if (static_cast<int>(dots.p_aimed.size()) == count) break;
-    if (taken.nearest(sample.p, k_dot_spacing_m)) continue;
+    if (static_cast<int>(dots.p_targets.size()) == count) break;
+    if (chosen.nearest(sample.p, k_dot_spacing_m)) continue;
     if (!reached(world, truth, sample, k_free_radius_m)) continue;
-    dots.p_aimed.push_back(sample.p);
-    taken.add(dots.p_aimed.size() - 1);
+    dots.p_targets.push_back(sample.p);
+    chosen.add(dots.p_targets.size() - 1);
     append_disc(sample, &dots.mesh);
   }
   return dots;
 }
 
 Registration judged_registration(const sim::World& world,
-                                 const AimedDots& dots,
+                                 const TargetDots& dots,
                                  std::span<const cv::Mat> projector_images) {
   const sim::Truth truth(world);
   const double reach_m = dots.spacing_m / 2;  // light nearer to a dot than this belongs to the dot
-  NearestPoints aimed(&dots.p_aimed, dots.spacing_m);
-  for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) aimed.add(i);
-  std::vector<double> energy(dots.p_aimed.size(), 0);
-  std::vector<Eigen::Vector3d> moment(dots.p_aimed.size(), Eigen::Vector3d::Zero());
+  NearestPoints targets(&dots.p_targets, dots.spacing_m);
+  for (std::size_t i = 0; i < dots.p_targets.size(); ++i) targets.add(i);
+  std::vector<double> energy(dots.p_targets.size(), 0);
+  std::vector<Eigen::Vector3d> moment(dots.p_targets.size(), Eigen::Vector3d::Zero());
   for (std::size_t i = 0; i < projector_images.size(); ++i) {
     const auto light = light_of_values(world.projector_effects[i].gamma);
     cv::Mat grey;
@@ -251,7 +251,7 @@ Registration judged_registration(const sim::World& world,
         if (value == 0) continue;
         const auto landing = truth.landing(world.rig.projectors[i], {column, row});
         if (!landing || landing->object != "prototype") continue;
-        const auto dot = aimed.nearest(landing->p_object, reach_m);
+        const auto dot = targets.nearest(landing->p_object, reach_m);
         if (!dot) continue;
         energy[*dot] += light[value];
         moment[*dot] += light[value] * place_of(dots, *dot, landing->p_object);
@@ -259,13 +259,13 @@ Registration judged_registration(const sim::World& world,
     }
   }
   Registration found;
-  found.points = static_cast<int>(dots.p_aimed.size());
-  const auto& truth_places = dots.p_centres.empty() ? dots.p_aimed : dots.p_centres;
+  found.points = static_cast<int>(dots.p_targets.size());
+  const auto& truth_places = dots.p_centres.empty() ? dots.p_targets : dots.p_centres;
   double sum = 0;
-  for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
-    const bool lit = energy[i] > 0;
-    if (!lit) ++found.unlit;
-    const double error_m = lit ? (moment[i] / energy[i] - truth_places[i]).norm() : reach_m;
+  for (std::size_t i = 0; i < dots.p_targets.size(); ++i) {
+    const bool has_light = energy[i] > 0;
+    if (!has_light) ++found.unlit;
+    const double error_m = has_light ? (moment[i] / energy[i] - truth_places[i]).norm() : reach_m;
     found.errors_mm.push_back(error_m * 1e3);
     sum += error_m * error_m * 1e6;
   }

@@ -15,24 +15,24 @@
 namespace limn::apps {
 
 /// Small white discs to be projected, each aimed at a point of the prototype's surface. Prototype frame.
-struct AimedDots {
-  scene::Mesh mesh;                      ///< The discs, unlit material.
-  std::vector<Eigen::Vector3d> p_aimed;  ///< Where the centre of each disc's light should land.
-  double spacing_m = 0;                  ///< Smallest distance between the points p_aimed.
+struct TargetDots {
+  scene::Mesh mesh;                        ///< The discs, unlit material.
+  std::vector<Eigen::Vector3d> p_targets;  ///< Where the centre of each disc's light should land.
+  double spacing_m = 0;                    ///< Smallest distance between the points p_targets.
 
   // For discs that float in front of the surface, else empty: their centres, and the viewpoint from which
-  // each disc covers its p_aimed.
+  // each disc covers its p_targets.
   std::vector<Eigen::Vector3d> p_centres;
-  Eigen::Vector3d p_eye = Eigen::Vector3d::Zero();
+  Eigen::Vector3d p_viewpoint = Eigen::Vector3d::Zero();
 };
 
 /// About `count` random points on the prototype, each with a disc. Uses only points at which some true
 /// projector reaches the whole disc, well inside its image.
-AimedDots aimed_dots(const sim::World& world, int count, std::uint64_t seed);
+TargetDots target_dots(const sim::World& world, int count, std::uint64_t seed);
 
 /// About `count` discs that float `height_m` off random points of the prototype and face the viewpoint. Seen
 /// from there, each covers a point that some true projector reaches.
-AimedDots floating_dots(
+TargetDots floating_dots(
     const sim::World& world, const Imager& viewer, double height_m, int count, std::uint64_t seed);
 
 /// The distance of light from where it was aimed: on the surface, or for floating discs in each disc's plane
@@ -48,7 +48,7 @@ struct Registration {
 /// Projects the 8-bit images (true gamma) through the true rig onto the true prototype, pixel by pixel, and
 /// compares the centroid of each dot's light with the point that it was aimed at.
 Registration judged_registration(const sim::World& world,
-                                 const AimedDots& dots,
+                                 const TargetDots& dots,
                                  std::span<const cv::Mat> projector_images);
 
 /// RMS distance in pixels between the outlines of two masks (non-zero is inside), in both directions.

@@ -25,7 +25,7 @@ void add_dots(CheckRun& run,
               const Registration& found,
               const std::vector<Eigen::Vector3d>& places,
               const std::string& remark) {
-  const cv::Mat actual = eye_image(light);
+  const cv::Mat actual = srgb_image(light);
   cv::Mat expected = bgr_image(cv::Mat(actual.size(), CV_8U, cv::Scalar(0))), difference = actual / 4;
   const double worst_mm = run.value(file + "_mm");
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -50,27 +50,28 @@ void add_dots(CheckRun& run,
               const std::vector<cv::Mat>& images,
               const Registration& found,
               const std::vector<Eigen::Vector3d>& places) {
-  add_dots(run, file, title, run.eye().seen(images), run.check().viewer, found, places, "");
+  add_dots(run, file, title, run.reference_view().rendered_light(images), run.check().viewer, found, places,
+           "");
 }
 
 }  // namespace
 
 Status judge_texture(CheckRun& run) {
-  const AimedDots dots = aimed_dots(run.world(), k_dot_count, k_dot_seed);
-  if (dots.p_aimed.empty()) return run.nothing_to_judge("texture_mm", "a point that a projector reaches");
-  LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::surface));
+  const TargetDots dots = target_dots(run.world(), k_dot_count, k_dot_seed);
+  if (dots.p_targets.empty()) return run.nothing_to_judge("texture_mm", "a point that a projector reaches");
+  LIMN_TRY(const auto images, run.projector_images_of(dots.mesh, scene::Mode::surface));
   const Registration found = judged_registration(run.world(), dots, images);
   run.set("texture_mm", found.rms_mm);
-  add_dots(run, "texture", "Surface-locked light", images, found, dots.p_aimed);
+  add_dots(run, "texture", "Surface-locked light", images, found, dots.p_targets);
   return {};
 }
 
 Status judge_parallax(CheckRun& run) {
-  const AimedDots dots =
+  const TargetDots dots =
       floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
-  if (dots.p_aimed.empty())
+  if (dots.p_targets.empty())
     return run.nothing_to_judge("parallax_mm", "a point in front of which a disc is visible");
-  LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::view));
+  LIMN_TRY(const auto images, run.projector_images_of(dots.mesh, scene::Mode::view));
   const Registration found = judged_registration(run.world(), dots, images);
   run.set("parallax_mm", *std::max_element(found.errors_mm.begin(), found.errors_mm.end()));
   add_dots(run, "parallax", "Points 50 mm off the surface", images, found, dots.p_centres);
@@ -80,17 +81,17 @@ Status judge_parallax(CheckRun& run) {
 // The image is drawn for the first viewer.
 Status judge_shared(CheckRun& run) {
   if (run.check().shares.empty()) return run.nothing_to_judge("shared_mm", "several viewers");
-  AimedDots dots = floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
-  if (dots.p_aimed.empty())
+  TargetDots dots = floating_dots(run.world(), run.check().viewer, k_off_surface_m, k_dot_count, k_dot_seed);
+  if (dots.p_targets.empty())
     return run.nothing_to_judge("shared_mm",
                                 "a point in front of which a disc is visible from the shared viewpoint");
-  LIMN_TRY(const auto images, run.drawn_instead(dots.mesh, scene::Mode::view));
+  LIMN_TRY(const auto images, run.projector_images_of(dots.mesh, scene::Mode::view));
   std::optional<Registration> first;
   std::string shares;
   double squares = 0;
   int viewers = 0;
   for (const scene::SharedViewpoint::Share& share : run.check().shares) {
-    dots.p_eye = run.world().world_from_prototype.inverse() * share.p_world;
+    dots.p_viewpoint = run.world().world_from_prototype.inverse() * share.p_world;
     const Registration found = judged_registration(run.world(), dots, images);
     shares += fmt::format(" {}: {:.0f} % of the shared viewpoint, RMS {:.1f} mm.", share.viewer,
                           100 * share.share, found.rms_mm);
@@ -101,12 +102,12 @@ Status judge_shared(CheckRun& run) {
   }
   run.set("shared_mm", std::sqrt(squares / viewers));
   Imager viewer = run.check().viewer;
-  viewer.imager_from_world =
-      looking_at(run.check().shares[0].p_world, *scene::middle_of(run.check().told.scene, run.check().posed),
-                 Eigen::Vector3d::UnitZ());
-  const ReferenceView seeing(run.world(), viewer, 1);
+  viewer.imager_from_world = looking_at(
+      run.check().shares[0].p_world, *scene::middle_of(run.check().renderer_input.scene, run.check().posed),
+      Eigen::Vector3d::UnitZ());
+  const ReferenceView first_view(run.world(), viewer, 1);
   add_dots(run, "shared", "Points 50 mm off the surface, as " + run.check().shares[0].viewer + " sees them",
-           seeing.seen(images), viewer, *first, dots.p_centres, shares);
+           first_view.rendered_light(images), viewer, *first, dots.p_centres, shares);
   return {};
 }
 

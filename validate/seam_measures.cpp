@@ -28,7 +28,7 @@ Eigen::Vector3f p_projector(const CheckRun& run, std::size_t i) {
 // The mean light of the projectors' black in the viewer's pixels, as if each projector reached everything
 // that faces it (CV_32FC3).
 cv::Mat mean_black(CheckRun& run, const sim::World& glowing) {
-  const sim::Samples& samples = run.fine_eye().samples;
+  const sim::Samples& samples = run.fine_reference_view().samples;
   cv::Mat light(samples.height, samples.width, CV_32FC3, cv::Scalar::all(0));
   const std::size_t projectors = glowing.rig.projectors.size();
   for (std::size_t i = 0; i < projectors; ++i) {
@@ -58,19 +58,19 @@ ProjectorResponse measured_response(const sim::ProjectorEffects& effects, const 
 
 // Mask of the pixels that the projectors can light evenly: one of them reaches the whole pixel at no grazing
 // angle, away from where all light ends.
-cv::Mat evenly_lit(CheckRun& run) {
-  const sim::Samples& samples = run.fine_eye().samples;
-  cv::Mat lit(run.check().viewer.height, run.check().viewer.width, CV_8U, cv::Scalar(0));
+cv::Mat even_light_mask(CheckRun& run) {
+  const sim::Samples& samples = run.fine_reference_view().samples;
+  cv::Mat mask(run.check().viewer.height, run.check().viewer.width, CV_8U, cv::Scalar(0));
   for (std::size_t i = 0; i < run.fine_reaches().size(); ++i) {
     const Eigen::Vector3f p_light = p_projector(run, i);
     cv::Mat steep(samples.height, samples.width, CV_32F, cv::Scalar(0));
     for (std::size_t k = 0; k < steep.total(); ++k)
       if (samples.n_world[k].dot((p_light - samples.p_world[k]).normalized()) > k_min_incidence_cosine)
         steep.at<float>(static_cast<int>(k)) = 1;
-    lit |= (run.fine_reaches()[i] > k_whole) & (binned(steep, k_finer) > k_whole);
+    mask |= (run.fine_reaches()[i] > k_whole) & (binned(steep, k_finer) > k_whole);
   }
-  cv::erode(lit, lit, square_kernel(k_light_end));
-  return lit;
+  cv::erode(mask, mask, square_kernel(k_light_end));
+  return mask;
 }
 
 // The variation of luminance around each pixel of `whole` as a share of `unit`, and the lines where another
@@ -112,7 +112,7 @@ Steps steps_of(CheckRun& run, const cv::Mat& light, double unit, const cv::Mat& 
   return steps;
 }
 
-cv::Mat shown_steps(const Steps& steps, double white) {
+cv::Mat steps_image(const Steps& steps, double white) {
   cv::Mat seams(steps.step.size(), CV_8UC3, cv::Scalar::all(0)), grey;
   seams.setTo(cv::Scalar(90, 70, 40), steps.along);
   steps.step.convertTo(grey, CV_8U, 255 / white);
@@ -122,9 +122,9 @@ cv::Mat shown_steps(const Steps& steps, double white) {
 }  // namespace
 
 Status judge_seams(CheckRun& run) {
-  LIMN_TRY(const auto images, run.drawn_instead(run.coat(), scene::Mode::surface));
-  const cv::Mat actual = run.fine_eye().seen(images);
-  const cv::Mat whole = evenly_lit(run);
+  LIMN_TRY(const auto images, run.projector_images_of(run.coat(), scene::Mode::surface));
+  const cv::Mat actual = run.fine_reference_view().rendered_light(images);
+  const cv::Mat whole = even_light_mask(run);
   const Steps steps = steps_of(run, actual, k_coat, whole);
   if (cv::countNonZero(steps.along) == 0)
     return run.nothing_to_judge("seam_step_…", "a seam of projectors in the viewer's image");
@@ -136,15 +136,15 @@ Status judge_seams(CheckRun& run) {
            fmt::format("Steps along seams: 95 % quantile {:.2f} %; worst anywhere {:.2f} %. Difference: "
                        "seams are blue, white is a step of 8 % or more.",
                        100 * steps.p95_along, 100 * steps.worst),
-           eye_image(actual), eye_image(expected), shown_steps(steps, 0.08)});
+           srgb_image(actual), srgb_image(expected), steps_image(steps, 0.08)});
   return {};
 }
 
 // Where nothing is shown, all projectors show black and their light adds up. Distance and incidence are
 // simulated, because they decide how much black light arrives.
 Status judge_black(CheckRun& run) {
-  sim::World glowing = run.fine_eye().world;
-  Rig rig = run.check().told.rig;
+  sim::World glowing = run.fine_reference_view().world;
+  Rig rig = run.check().renderer_input.rig;
   for (std::size_t i = 0; i < glowing.projector_effects.size(); ++i) {
     sim::ProjectorEffects& effects = glowing.projector_effects[i];
     effects = {.illuminance_at_1m = 1,
@@ -152,13 +152,14 @@ Status judge_black(CheckRun& run) {
                .black_level = run.check().truth.projector_effects[i].black_level};
     rig.responses.push_back(measured_response(effects, rig.projectors[i].name));
   }
-  const cv::Mat whole = evenly_lit(run), one_black = mean_black(run, glowing);
+  const cv::Mat whole = even_light_mask(run), one_black = mean_black(run, glowing);
   const double brightest = cv::mean(one_black, whole)[0];
   if (!(brightest > 0)) return run.nothing_to_judge("black_step_share", "projectors whose black gives light");
-  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(run.check().told.scene, rig));
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(run.check().renderer_input.scene, rig));
   LIMN_TRY_STATUS(renderer.set_light({.even_black = true}));
-  const auto images = run.drawn_by(renderer, {run.check().told.posed.world_from_prototype, {}});
-  const cv::Mat actual = run.fine_eye().seen(glowing, images);
+  const auto images =
+      run.projector_images_by(renderer, {run.check().renderer_input.posed.world_from_prototype, {}});
+  const cv::Mat actual = run.fine_reference_view().rendered_light(glowing, images);
   const Steps steps = steps_of(run, actual / one_black, 1, whole);
   if (cv::countNonZero(steps.along) == 0)
     return run.nothing_to_judge("black_step_share", "a seam of projectors in the viewer's image");
@@ -170,7 +171,7 @@ Status judge_black(CheckRun& run) {
            fmt::format("Steps along seams: 95 % quantile {:.1f} %, worst {:.1f} % of one projector's black. "
                        "Difference: seams are blue, white is a step of 40 % or more.",
                        100 * steps.p95_along, 100 * steps.worst_along),
-           eye_image(actual * brightness), eye_image(even * brightness), shown_steps(steps, 0.4)});
+           srgb_image(actual * brightness), srgb_image(even * brightness), steps_image(steps, 0.4)});
   return {};
 }
 

@@ -62,7 +62,7 @@ sim::Object hand_object(const Pose& world_from_hand, double width_m, double heig
 // The world with the hand at some position, or without it, as traced for the cameras and the viewpoint.
 struct Traced {
   std::vector<sim::Samples> cameras;
-  sim::Samples eye;
+  sim::Samples viewer;
 };
 
 class Session {
@@ -83,16 +83,16 @@ class Session {
     LIMN_TRY_STATUS(renderer_->set_light({.compensation = projector::Compensation::geometry}));
     shadows_.emplace(rig);
     const Traced free = traced(std::nullopt);
-    shown_.resize(rig.projectors.size());
+    projected_.resize(rig.projectors.size());
     for (int k = 0; k < k_dark_frames; ++k) monitor(free);
     draw();
-    first_ = shown_;
-    before_ = light(free, shown_);
+    first_ = projected_;
+    before_ = light(free, projected_);
     ShadowFillReading reading;
     for (int k = 0; k < k_still_frames; ++k) {
       monitor(free);
       draw();
-      reading.still_levels = std::max(reading.still_levels, worst_difference(shown_, first_));
+      reading.still_levels = std::max(reading.still_levels, worst_difference(projected_, first_));
     }
     const Traced there = traced(0.0);
     LIMN_TRY_STATUS(find_lost(there));
@@ -100,12 +100,12 @@ class Session {
     for (int k = 0; k < k_stay_frames; ++k) step(there, "stays", &reading);
     reading.before = before_;
     reading.lost = light(there, first_);
-    reading.refilled = light(there, shown_);
+    reading.refilled = light(there, projected_);
     for (int k = 1; k <= k_move_frames; ++k) step(traced(k * hand_.step_m), "moves", &reading);
     for (int k = 0; k < k_gone_frames; ++k) {
       step(free, "gone", &reading);
       if (k > k_allowed_frames)
-        reading.back_levels = std::max(reading.back_levels, worst_difference(shown_, first_));
+        reading.back_levels = std::max(reading.back_levels, worst_difference(projected_, first_));
     }
     return reading;
   }
@@ -115,10 +115,10 @@ class Session {
   Pose world_from_hand(double moved_m) const {
     const Imager& projector = world_.rig.projectors[hand_.projector];
     const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
-    const Eigen::Vector3d p_aim = world_.world_from_prototype * hand_.p_aim;
-    Pose pose = looking_at(p_light, p_aim, Eigen::Vector3d::UnitZ()).inverse();
-    pose.translation =
-        p_light + hand_.at * (p_aim - p_light) + pose.rotation * Eigen::Vector3d(moved_m, -0.3 * moved_m, 0);
+    const Eigen::Vector3d p_target = world_.world_from_prototype * hand_.p_target;
+    Pose pose = looking_at(p_light, p_target, Eigen::Vector3d::UnitZ()).inverse();
+    pose.translation = p_light + hand_.at * (p_target - p_light) +
+                       pose.rotation * Eigen::Vector3d(moved_m, -0.3 * moved_m, 0);
     return pose;
   }
 
@@ -131,8 +131,8 @@ class Session {
       out.cameras.push_back(sim::trace(world, static_cast<int>(i)));
     world.rig.cameras = {viewer_};
     world.camera_effects = {sim::CameraEffects{.colour = true}};
-    out.eye = sim::trace(world, 0);
-    std::fill(out.eye.room_light.begin(), out.eye.room_light.end(), 0.0F);
+    out.viewer = sim::trace(world, 0);
+    std::fill(out.viewer.room_light.begin(), out.viewer.room_light.end(), 0.0F);
     return out;
   }
 
@@ -140,28 +140,29 @@ class Session {
   // detected as in a session.
   void monitor(const Traced& traced) {
     const Stamp at = shifted(Stamp{}, static_cast<double>(frames_ + 1) * k_period_s);
-    history_.add(shown_, at);
+    history_.add(projected_, at);
     Percepts percepts;
     for (std::size_t i = 0; i < traced.cameras.size(); ++i)
       percepts.frames.push_back({world_.rig.cameras[i].name,
-                                 sim::photograph(world_, traced.cameras[i], shown_, seed_ + frames_), at});
+                                 sim::photograph(world_, traced.cameras[i], projected_, seed_ + frames_),
+                                 at});
     shadows_->update(percepts, posed_, history_, &*renderer_);
     ++frames_;
   }
 
   void draw() {
-    shown_.clear();
+    projected_.clear();
     for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
-      shown_.push_back(renderer_->projector_image(i, posed_, viewer_));
+      projected_.push_back(renderer_->projector_image(i, posed_, viewer_));
   }
 
   // The projectors' light on the prototype as seen from the viewpoint; 0 elsewhere.
   cv::Mat light(const Traced& traced, const std::vector<cv::Mat>& shown) const {
-    sim::World eye = world_;
-    eye.rig.cameras = {viewer_};
-    eye.camera_effects = {sim::CameraEffects{.colour = true}};
-    cv::Mat out = sim::ideal_light(eye, traced.eye, shown);
-    out.setTo(0, ~whole(traced.eye));
+    sim::World world = world_;
+    world.rig.cameras = {viewer_};
+    world.camera_effects = {sim::CameraEffects{.colour = true}};
+    cv::Mat out = sim::ideal_light(world, traced.viewer, shown);
+    out.setTo(0, ~whole(traced.viewer));
     return out;
   }
 
@@ -192,7 +193,7 @@ class Session {
         others.back() = cv::Mat(projector.height, projector.width, CV_8UC3, cv::Scalar::all(255));
     }
     out.where = (out.wanted - out.without > k_least_loss * out.wanted) & is_light(out.wanted) &
-                whole(traced.eye) & (grey(light(traced, others)) > out.wanted);
+                whole(traced.viewer) & (grey(light(traced, others)) > out.wanted);
     return out;
   }
 
@@ -221,14 +222,14 @@ class Session {
 
   // One frame with the hand as traced: measures what is shown, then lets the cameras see it.
   void step(const Traced& traced, const std::string& phase, ShadowFillReading* reading) {
-    const cv::Mat actual = light(traced, shown_);
+    const cv::Mat actual = light(traced, projected_);
     const Loss lost = loss(traced);
     cv::Mat since(since_.size(), CV_32S, cv::Scalar(0));
     cv::Mat(since_ + 1).copyTo(since, lost.where);
     since_ = since;
     const cv::Mat old = since_ > k_allowed_frames;
     ShadowFillFrame frame{phase, back_share(lost, actual, lost.where), flash(traced, actual),
-                          worst_difference(shown_, first_)};
+                          worst_difference(projected_, first_)};
     if (cv::countNonZero(old) >= k_least_pixels)
       reading->share = std::min(reading->share, back_share(lost, actual, old));
     reading->flash = std::max(reading->flash, frame.flash);
@@ -250,7 +251,7 @@ class Session {
     const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {k_light_end, k_light_end});
     cv::dilate(wanted, highest, around);
     cv::erode(wanted, lowest, around);
-    cv::erode(whole(traced.eye) & is_light(wanted), where, around);
+    cv::erode(whole(traced.viewer) & is_light(wanted), where, around);
     where &= highest - lowest < k_edge * wanted;
     double worst = 0;
     cv::minMaxLoc(found / wanted - 1, nullptr, &worst, nullptr, nullptr, where);
@@ -272,7 +273,7 @@ class Session {
   std::optional<projector::Renderer> renderer_;
   ProjectionHistory history_;
   std::optional<ShadowWatch> shadows_;
-  std::vector<cv::Mat> shown_, first_;
+  std::vector<cv::Mat> projected_, first_;
   cv::Mat before_;
   cv::Mat since_;  // CV_32S: number of frames that each pixel has been in the shadow
 };

@@ -17,11 +17,11 @@ namespace limn::apps {
 /// A person's hand in a projector's light, modelled as a sheet that faces the projector.
 struct Hand {
   std::size_t projector = 0;
-  double at = 0.6;  ///< Position as a share of the way from the projector to p_aim.
+  double at = 0.6;  ///< Position as a share of the way from the projector to p_target.
   double width_m = 0.09, height_m = 0.18;
-  Eigen::Vector3d p_aim = Eigen::Vector3d::Zero();  ///< Point of the prototype that the blocked light is
-                                                    ///< aimed at, prototype frame.
-  double step_m = 0.025;                            ///< Distance between two frames while it moves.
+  Eigen::Vector3d p_target = Eigen::Vector3d::Zero();  ///< Point of the prototype that the blocked light is
+                                                       ///< aimed at, prototype frame.
+  double step_m = 0.025;                               ///< Distance between two frames while it moves.
 };
 
 /// One frame of a session with a hand in the light, as the ray tracer measures it.

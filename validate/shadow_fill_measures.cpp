@@ -12,9 +12,10 @@ namespace limn::apps {
 
 // Uses the true world with its room and noise.
 Status judge_refill(CheckRun& run) {
-  const auto [scene, posed] = run.check().told.posed.parts.empty()
-                                  ? run.shown_instead(run.coat(), scene::Mode::surface)
-                                  : std::pair(run.check().told.scene, run.check().told.posed);
+  const auto [scene, posed] =
+      run.check().renderer_input.posed.parts.empty()
+          ? run.scene_with_mesh(run.coat(), scene::Mode::surface)
+          : std::pair(run.check().renderer_input.scene, run.check().renderer_input.posed);
   const auto reading = measured_shadow_fill(run.check().truth, scene, posed, run.check().viewer,
                                             run.check().hand, run.check().truth.seed);
   if (!reading) return error("{}: {}", run.check().name, reading.message());
@@ -28,7 +29,7 @@ Status judge_refill(CheckRun& run) {
            fmt::format("Expected: without the hand. Share of the shadow that is filled, frame by frame:{}. "
                        "Brighter by {:.1f} % at most. Difference: amplified 32 times.",
                        shares, 100 * reading->flash),
-           eye_image(reading->refilled), eye_image(reading->before),
+           srgb_image(reading->refilled), srgb_image(reading->before),
            amplified(cv::abs(reading->refilled - reading->before))});
   return {};
 }

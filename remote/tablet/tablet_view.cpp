@@ -322,7 +322,7 @@ cv::Mat TabletView::Impl::composite_of(const Imager& camera,
       if (as_screen && !draw_state->is_viewer &&
           snapshot.scene->find_slot(treatment.slot)->mode == scene::Mode::view)
         treatment = {treatment.slot, projector::Composite::full};
-      if (treatment.whole() > 0) continue;
+      if (treatment.full_weight() > 0) continue;
       for (const projector::PartCoverage& part : coverage)
         if (part.slot == treatment.slot && part.viewer_pixels > 0 && part.off_surface_share == 0)
           draw_state->fully_projected.insert(part.slot);

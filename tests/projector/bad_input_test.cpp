@@ -45,12 +45,12 @@ scene::Scene wall_and_part() {
 
 scene::PosedScene posed_at_origin() { return {Pose(), {{"part", "a", Pose()}}}; }
 
-Imager viewer_from(const Vector3d& p_eye, const Vector3d& p_target) {
-  return viewer_imager(looking_at(p_eye, p_target, k_up).inverse(), 320, 240, 35);
+Imager viewer_from(const Vector3d& p_viewpoint, const Vector3d& p_target) {
+  return viewer_imager(looking_at(p_viewpoint, p_target, k_up).inverse(), 320, 240, 35);
 }
 
-Imager projector_from(const std::string& name, const Vector3d& p_eye, const Vector3d& p_target) {
-  return {name, 320, 200, Lens::pinhole(450, 450, 159.5, 99.5), looking_at(p_eye, p_target, k_up)};
+Imager projector_from(const std::string& name, const Vector3d& p_viewpoint, const Vector3d& p_target) {
+  return {name, 320, 200, Lens::pinhole(450, 450, 159.5, 99.5), looking_at(p_viewpoint, p_target, k_up)};
 }
 
 Rig one_projector() {
@@ -166,13 +166,14 @@ TEST_F(BadInput, NoPlaceOfTheViewersEyeMakesMoreLightThanThePartHas) {
   Renderer drawing = renderer(scene, one_projector());
   const int own = static_cast<int>(std::ceil(255 * std::pow(0.5, 1 / 2.2)));
   const Vector3d behind(0, 0, 0.5);
-  for (const Vector3d& p_eye :
+  for (const Vector3d& p_viewpoint :
        {behind, Vector3d(0.01, 0, 0), Vector3d(0, 0, -0.03), Vector3d(0.02, 0.01, -0.0301),
         Vector3d(0, 0, -0.01), Vector3d(0.2, 0.1, -1e-4), Vector3d(0, 0, -100)}) {
-    const Imager viewer = viewer_from(p_eye, p_eye.z() < -0.03 ? Vector3d(0, 0, 0) : Vector3d(0.001, 0, 0.3));
+    const Imager viewer =
+        viewer_from(p_viewpoint, p_viewpoint.z() < -0.03 ? Vector3d(0, 0, 0) : Vector3d(0.001, 0, 0.3));
     const cv::Mat image = drawing.projector_image(0, posed_at_origin(), viewer);
-    EXPECT_LE(brightest(image), own) << p_eye.transpose();
-    if (p_eye == behind) {
+    EXPECT_LE(brightest(image), own) << p_viewpoint.transpose();
+    if (p_viewpoint == behind) {
       EXPECT_EQ(brightest(image), 0);
     }
     for (const PartCoverage& part : drawing.coverage(posed_at_origin(), viewer)) {

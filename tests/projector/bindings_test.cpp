@@ -129,8 +129,8 @@ TEST(Defines, AreThoseThatShadersAskFor) {
 }
 
 TEST(Defines, AddUp) {
-  constexpr Defines both = Defines{Define::listed} + Defines{Define::view_parts};
-  EXPECT_TRUE(both.contains(Define::listed) && both.contains(Define::view_parts));
+  constexpr Defines both = Defines{Define::work_list} + Defines{Define::view_parts};
+  EXPECT_TRUE(both.contains(Define::work_list) && both.contains(Define::view_parts));
   EXPECT_FALSE(both.contains(Define::surface_maps) || both.contains(Define::by_measurement));
 }
 

@@ -80,10 +80,10 @@ sim::World printed_world() {
   sim::World world = test::small_world();
   world.rig.cameras[0] = {"camera0", 640, 480, Lens::pinhole(900, 900, 319.5, 239.5),
                           looking_at({0.03, 0.02, 0.05}, {0, 1, 0}, Vector3d::UnitZ())};
-  const auto projector = [](const char* name, const Vector3d& p_eye, double fx) {
+  const auto projector = [](const char* name, const Vector3d& p_viewpoint, double fx) {
     return Imager{name, 640, 400,
                   Lens::create("LENSMODEL_OPENCV4", {fx, fx, 320, 205, -0.05, 0.01, 1e-4, 2e-4}).value(),
-                  looking_at(p_eye, {0, 1, 0}, Vector3d::UnitZ())};
+                  looking_at(p_viewpoint, {0, 1, 0}, Vector3d::UnitZ())};
   };
   world.rig.projectors = {projector("projector0", {-0.4, -0.05, 0.12}, 1000),
                           projector("projector1", {0.35, 0.1, 0.05}, 900)};

@@ -73,7 +73,7 @@ TEST(CompositePolicy, NeverChangesTwiceWithinTheHold) {
       ++changes;
     }
     if (!policies.empty())
-      fastest = std::max(fastest, std::abs(after[0].whole() - policies[0].whole()) / step);
+      fastest = std::max(fastest, std::abs(after[0].full_weight() - policies[0].full_weight()) / step);
     policies = after;
   }
   EXPECT_GT(changes, 300);
@@ -87,22 +87,22 @@ TEST(CompositePolicy, OnePassesIntoTheOtherWithinTheFadeWhateverTheStepsOfTime) 
     const CompositePolicyOptions options{0.3, 0.5, 0, 0.4};
     PartCoverage part = covered("mirror", 0.9);
     auto policies = updated_policies({}, std::span(&part, 1), 0, options);
-    EXPECT_EQ(policies[0].whole(), 0) << "at first there is nothing to fade from";
+    EXPECT_EQ(policies[0].full_weight(), 0) << "at first there is nothing to fade from";
     part = covered("mirror", 0.1);
     policies = updated_policies(policies, std::span(&part, 1), step, options);
     EXPECT_EQ(policies[0].what, Composite::full);
-    EXPECT_EQ(policies[0].whole(), 0) << "a cross-fade starts from the previous state";
+    EXPECT_EQ(policies[0].full_weight(), 0) << "a cross-fade starts from the previous state";
     for (double seconds = step; seconds < 0.2; seconds += step) {
       policies = updated_policies(policies, std::span(&part, 1), step, options);
-      EXPECT_NEAR(policies[0].whole(), seconds / options.fade_s, 1e-9);
+      EXPECT_NEAR(policies[0].full_weight(), seconds / options.fade_s, 1e-9);
     }
     part = covered("mirror", 0.9);  // back again during the cross-fade
-    const double before = policies[0].whole();
+    const double before = policies[0].full_weight();
     policies = updated_policies(policies, std::span(&part, 1), step, options);
     EXPECT_EQ(policies[0].what, Composite::rest);
-    EXPECT_NEAR(policies[0].whole(), before + step / options.fade_s, 1e-9);
+    EXPECT_NEAR(policies[0].full_weight(), before + step / options.fade_s, 1e-9);
     policies = updated_policies(policies, {}, 1, options);  // also while the part is not visible
-    EXPECT_EQ(policies[0].whole(), 0);
+    EXPECT_EQ(policies[0].full_weight(), 0);
   }
 }
 

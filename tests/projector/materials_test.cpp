@@ -16,38 +16,38 @@ namespace {
 
 using MaterialsTest = RendererTest;
 
-// Light of strength pi reflected towards d_eye by a surface with reflectance `head_on` at normal incidence:
+// Light of strength pi reflected towards d_view by a surface with reflectance `f0` at normal incidence:
 // GGX, Smith, Fresnel (glTF 2.0, appendix B).
-Vector3d mirrored(const Vector3d& head_on,
+Vector3d specular(const Vector3d& f0,
                   double roughness,
                   const Vector3d& n,
-                  const Vector3d& d_eye,
+                  const Vector3d& d_view,
                   const Vector3d& d_light) {
-  const double nl = n.dot(d_light), nv = n.dot(d_eye), a2 = std::pow(roughness, 4);
+  const double nl = n.dot(d_light), nv = n.dot(d_view), a2 = std::pow(roughness, 4);
   if (nl <= 0) return Vector3d::Zero();
-  const Vector3d h = (d_eye + d_light).normalized();
+  const Vector3d h = (d_view + d_light).normalized();
   const double peak = std::pow(n.dot(h), 2) * (a2 - 1) + 1;
   const double visible = nl * std::sqrt(nv * nv * (1 - a2) + a2) + nv * std::sqrt(nl * nl * (1 - a2) + a2);
-  const Vector3d fresnel = head_on + (Vector3d::Ones() - head_on) * std::pow(1 - d_eye.dot(h), 5);
+  const Vector3d fresnel = f0 + (Vector3d::Ones() - f0) * std::pow(1 - d_view.dot(h), 5);
   return nl * a2 / (peak * peak) * 0.5 / visible * fresnel;
 }
 
-// A second implementation of shaders/look.glsl that sums the soft light over directions. Its horizon is
+// A second implementation of shaders/shading.glsl that sums the soft light over directions. Its horizon is
 // smooth over heights from -0.3 to 0.3; there is one lamp.
-Vector3d lit(const Vector3d& base,
-             double metallic,
-             double roughness,
-             const Vector3d& n,
-             const Vector3d& d_eye,
-             const scene::RoomLight& room,
-             double open = 1) {
+Vector3d shaded(const Vector3d& base,
+                double metallic,
+                double roughness,
+                const Vector3d& n,
+                const Vector3d& d_view,
+                const scene::RoomLight& room,
+                double open = 1) {
   const auto soft = [&](double above) -> Vector3d {
     return open * room.below_rgb + open * above * (room.above_rgb - room.below_rgb);
   };
   const Vector3d diffuse = (1 - metallic) * base;
-  const Vector3d head_on = (1 - metallic) * Vector3d::Constant(0.04) + metallic * base;
+  const Vector3d f0 = (1 - metallic) * Vector3d::Constant(0.04) + metallic * base;
   const double diffuse_above = 0.5 + 0.5 * n.dot(room.d_up_world);
-  Vector3d colour = (Vector3d::Ones() - head_on).cwiseProduct(diffuse).cwiseProduct(soft(diffuse_above));
+  Vector3d colour = (Vector3d::Ones() - f0).cwiseProduct(diffuse).cwiseProduct(soft(diffuse_above));
   const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
   constexpr int k_rings = 300, k_steps = 300;
   for (int i = 0; i < k_rings; ++i)
@@ -58,13 +58,13 @@ Vector3d lit(const Vector3d& base,
       const double t = std::clamp((d.dot(room.d_up_world) + 0.3) / 0.6, 0.0, 1.0);
       // Solid angle divided by pi.
       const Vector3d light = soft(t * t * (3 - 2 * t)) * (2.0 / (k_rings * k_steps));
-      colour += mirrored(head_on, roughness, n, d_eye, d).cwiseProduct(light);
+      colour += specular(f0, roughness, n, d_view, d).cwiseProduct(light);
     }
   const Vector3d& d_lamp = room.lamps[0].d_world;
-  const Vector3d h = (d_eye + d_lamp).normalized();
-  const Vector3d fresnel = head_on + (Vector3d::Ones() - head_on) * std::pow(1 - d_eye.dot(h), 5);
+  const Vector3d h = (d_view + d_lamp).normalized();
+  const Vector3d fresnel = f0 + (Vector3d::Ones() - f0) * std::pow(1 - d_view.dot(h), 5);
   const Vector3d by_lamp = std::max(0.0, n.dot(d_lamp)) * (Vector3d::Ones() - fresnel).cwiseProduct(diffuse) +
-                           mirrored(head_on, roughness, n, d_eye, d_lamp);
+                           specular(f0, roughness, n, d_view, d_lamp);
   return colour + by_lamp.cwiseProduct(room.lamps[0].strength_rgb);
 }
 
@@ -86,7 +86,8 @@ TEST_F(MaterialsTest, MetalAndGlossAreAsInGltf) {
     for (int row = 140; row <= 340; row += 50)
       for (int column = 200; column <= 440; column += 40) {
         const Ray ray = *rig.cameras[0].ray(Vector2d(column, row));
-        const Vector3d wanted = lit({0.7, 0.45, 0.2}, metallic, roughness, {0, 0, -1}, -ray.d, *scene.light);
+        const Vector3d wanted =
+            shaded({0.7, 0.45, 0.2}, metallic, roughness, {0, 0, -1}, -ray.d, *scene.light);
         const auto& bgr = seen.at<cv::Vec3b>(row, column);
         for (int c = 0; c < 3; ++c)
           worst = std::max(worst, std::abs(bgr[2 - c] - 255 * srgb_from_linear(std::min(1.0, wanted[c]))));
@@ -144,10 +145,10 @@ Mesh fields(double z) {
 Vector3d middle_of_field(int k, double z) { return {k % 2 ? 0.05 : -0.05, k / 2 ? 0.05 : -0.05, z}; }
 
 // The expected colour in the middle of field k; the sheet faces -z, up is -y.
-Vector3d wanted_of_field(int k, const Vector3d& d_eye, const scene::RoomLight& room) {
+Vector3d wanted_of_field(int k, const Vector3d& d_view, const scene::RoomLight& room) {
   const Field& field = k_fields[k];
   const Vector3d n = Vector3d(field.along.x(), -field.along.y(), -field.along.z()).normalized();
-  return lit(k_field_colour, field.metallic, field.roughness, n, d_eye, room, field.open) +
+  return shaded(k_field_colour, field.metallic, field.roughness, n, d_view, room, field.open) +
          Vector3d::Constant(field.glow * k_field_glow * linear_from_srgb(188 / 255.0));
 }
 
@@ -171,9 +172,9 @@ TEST_F(MaterialsTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
       k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
   Rig rig = two_projectors();
   rig.projectors.pop_back();
-  const Imager &eye = rig.cameras[0], &projector = rig.projectors[0];
+  const Imager &camera = rig.cameras[0], &projector = rig.projectors[0];
   const Imager viewer = viewer_from({-0.3, -0.3, -1.2});
-  const Vector3d p_eye = eye.imager_from_world.inverse().translation;
+  const Vector3d p_camera = camera.imager_from_world.inverse().translation;
   const Vector3d p_viewer = viewer.imager_from_world.inverse().translation;
   const auto srgb = [](double light) { return srgb_from_linear(light); };
   const auto gamma = [](double light) { return std::pow(light, 1 / 2.2); };
@@ -184,17 +185,17 @@ TEST_F(MaterialsTest, MapsOfASurfaceAreReadInLightCompositesAndViews) {
     const PosedScene posed = posed_at_origin(scene);
     Renderer drawing = renderer(scene, rig);
     const cv::Mat composite = drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), posed, Composite::full);
-    const cv::Mat view = drawing.view(eye, posed, cv::Scalar());
+    const cv::Mat view = drawing.view(camera, posed, cv::Scalar());
     const cv::Mat light = drawing.projector_image(0, posed, viewer);
     for (int k = 0; k < 4; ++k) {
-      const Vector3d p = middle_of_field(k, z), d_eye = (p_eye - p).normalized(),
+      const Vector3d p = middle_of_field(k, z), d_view = (p_camera - p).normalized(),
                      d_viewer = (p_viewer - p).normalized();
       const bool on_surface = mode == scene::Mode::surface;
       const Vector3d d_up(0, 0, -1);
       SCOPED_TRACE(fmt::format("field {} {}", k, on_surface ? "on the surface" : "for the viewer"));
-      const Vector3d seen = wanted_of_field(k, on_surface ? d_up : d_eye, room);
-      EXPECT_LT(levels_off(composite, eye, p, seen, srgb), 1.5);
-      EXPECT_LT(levels_off(view, eye, p, wanted_of_field(k, d_eye, room), srgb), 1.5);
+      const Vector3d seen = wanted_of_field(k, on_surface ? d_up : d_view, room);
+      EXPECT_LT(levels_off(composite, camera, p, seen, srgb), 1.5);
+      EXPECT_LT(levels_off(view, camera, p, wanted_of_field(k, d_view, room), srgb), 1.5);
       const Vector3d p_lit =
           on_surface ? p : Vector3d(p - d_viewer * (z / d_viewer.z()));  // where the viewer sees the field
       EXPECT_LT(
@@ -351,9 +352,9 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutGivesNoLight) {
     const double z = mode == scene::Mode::view ? -0.05 : -0.0005;
     const Scene scene = scene_of(sheet(0.5, 0.4), {slot("ring", mode, ring(z, {255, 255, 255}))});
     Renderer drawing = renderer(scene, rig);
-    const Vector3d p_eye(-0.3, -0.3, -1.2);
+    const Vector3d p_camera(-0.3, -0.3, -1.2);
     const PosedScene posed = posed_at_origin(scene);
-    const cv::Mat light = drawing.projector_image(0, posed, viewer_from(p_eye));
+    const cv::Mat light = drawing.projector_image(0, posed, viewer_from(p_camera));
     int same = 0, either = 0, beside = 0;
     for (int row = 0; row < light.rows; ++row)
       for (int column = 0; column < light.cols; ++column) {
@@ -361,7 +362,7 @@ TEST_F(MaterialsTest, WhatAMaterialCutsOutGivesNoLight) {
           const auto p = on_sheet(*rig.projectors[0].ray(px), 0.5, 0.4, 0);
           if (!p) return false;
           if (mode == scene::Mode::surface) return is_on_ring(p->x(), p->y());
-          const auto q = on_sheet(Ray{p_eye, (*p - p_eye).normalized()}, 0.2, 0.2, z);
+          const auto q = on_sheet(Ray{p_camera, (*p - p_camera).normalized()}, 0.2, 0.2, z);
           return q && is_on_ring(q->x(), q->y());
         };
         const bool expected = expected_at(Vector2d(column, row));

@@ -93,15 +93,15 @@ TEST_F(RendererTest, ViewPartStandsWhereTheViewersEyeSeesIt) {
   posed.parts[0].world_from_part.translation = {0.2, 0.02, 0};
   Rig rig = two_projectors();
   rig.projectors.pop_back();
-  for (const Vector3d& p_eye : {Vector3d(-0.3, -0.3, -1.2), Vector3d(0.4, 0.1, -1.0)}) {
-    const cv::Mat found = renderer(scene, rig).projector_image(0, posed, viewer_from(p_eye));
+  for (const Vector3d& p_viewpoint : {Vector3d(-0.3, -0.3, -1.2), Vector3d(0.4, 0.1, -1.0)}) {
+    const cv::Mat found = renderer(scene, rig).projector_image(0, posed, viewer_from(p_viewpoint));
     cv::Mat expected(found.size(), CV_64FC3), light(found.size(), CV_64FC3);
     for (int row = 0; row < found.rows; ++row) {
       for (int column = 0; column < found.cols; ++column) {
         const double cover = pixel_mean(column, row, [&](const Vector2d& px) {
           const auto p = on_sheet(*rig.projectors[0].ray(px), 0.5, 0.4, 0);
           if (!p) return 0;
-          const Ray from_eye{p_eye - Vector3d(0.2, 0.02, 0), (*p - p_eye).normalized()};
+          const Ray from_eye{p_viewpoint - Vector3d(0.2, 0.02, 0), (*p - p_viewpoint).normalized()};
           return on_sheet(from_eye, 0.16, 0.1, -0.05) ? 1 : 0;
         });
         for (int c = 0; c < 3; ++c) {
@@ -378,10 +378,10 @@ TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
   // The projectors stand side by side, so that a point's pixels in the two images are 320 pixels apart.
   constexpr int k_shift = 320;
   const double black[2] = {0.004, 0.01};
-  const Vector3d p_eye[2] = {{-0.2, 0, -1}, {0.2, 0, -1}};
+  const Vector3d p_viewpoint[2] = {{-0.2, 0, -1}, {0.2, 0, -1}};
   Rig rig;
   for (std::size_t i = 0; i < 2; ++i) {
-    const Pose projector_from_world(Eigen::Quaterniond::Identity(), -p_eye[i]);
+    const Pose projector_from_world(Eigen::Quaterniond::Identity(), -p_viewpoint[i]);
     rig.projectors.push_back({i == 0 ? "projector0" : "projector1", 640, 400,
                               Lens::pinhole(800, 800, 320, 200), projector_from_world});
     rig.responses.push_back({rig.projectors[i].name, {0, 1}, {0, 1}, {0, 1}});
@@ -391,7 +391,7 @@ TEST_F(RendererTest, BlendSharesTheLightAndMakesUpForMissingBlack) {
   const cv::Mat blend[2] = {drawing.blend(0, posed), drawing.blend(1, posed)};
   const cv::Mat points = drawing.surface_points(0, posed);
   const auto irradiance = [&](std::size_t i, const Vector3d& p) {
-    return 1 / std::pow((p_eye[i] - p).norm(), 3);
+    return 1 / std::pow((p_viewpoint[i] - p).norm(), 3);
   };
   double worst = 0, worst_lift = 0;
   int both = 0, alone = 0, nowhere = 0;

@@ -95,10 +95,10 @@ class Room {
   Room() {
     world.rig.cameras[0] = {"camera0", 640, 480, Lens::pinhole(900, 900, 319.5, 239.5),
                             looking_at({0.03, 0.02, 0.05}, {0, 1, 0}, Vector3d::UnitZ())};
-    const auto projector = [](const char* name, const Vector3d& p_eye) {
+    const auto projector = [](const char* name, const Vector3d& p_viewpoint) {
       return Imager{name, 320, 200,
                     Lens::create("LENSMODEL_OPENCV4", {500, 500, 160, 102, -0.05, 0.01, 1e-4, 2e-4}).value(),
-                    looking_at(p_eye, {0, 1, 0}, Vector3d::UnitZ())};
+                    looking_at(p_viewpoint, {0, 1, 0}, Vector3d::UnitZ())};
     };
     world.rig.projectors = {projector("projector0", {-0.4, -0.05, 0.12}),
                             projector("projector1", {0.35, 0.1, 0.05})};
@@ -150,20 +150,20 @@ class Room {
     posed = {world.world_from_prototype, {{part, "a", world.world_from_prototype * prototype_from_part}}};
   }
 
-  // A hand on the line from p_eye to p_target, facing along it.
-  static sim::Object hand(const Vector3d& p_eye, const Vector3d& p_target, double at) {
-    Pose pose = looking_at(p_eye, p_target, Vector3d::UnitZ()).inverse();
-    pose.translation = p_eye + at * (p_target - p_eye);
+  // A hand on the line from p_viewpoint to p_target, facing along it.
+  static sim::Object hand(const Vector3d& p_viewpoint, const Vector3d& p_target, double at) {
+    Pose pose = looking_at(p_viewpoint, p_target, Vector3d::UnitZ()).inverse();
+    pose.translation = p_viewpoint + at * (p_target - p_viewpoint);
     sim::Object object = sim::sheet("hand", 0.07, 0.09, {}, pose);
     object.albedo = {0.28, 0.4, 0.62};
     return object;
   }
-  Vector3d p_eye(const Imager& imager) const { return imager.imager_from_world.inverse().translation; }
+  Vector3d p_viewpoint(const Imager& imager) const { return imager.imager_from_world.inverse().translation; }
 
   void trace(const std::vector<sim::Object>& hands) {
-    stage = world;
-    for (const sim::Object& object : hands) stage.objects.push_back(object);
-    samples = sim::trace(stage, 0);
+    world_with_hands = world;
+    for (const sim::Object& object : hands) world_with_hands.objects.push_back(object);
+    samples = sim::trace(world_with_hands, 0);
   }
 
   std::vector<cv::Mat> images() {
@@ -176,10 +176,10 @@ class Room {
   }
 
   bool frame(const std::vector<cv::Mat>& shown) {
-    return arriving->see(0, sim::photograph(stage, samples, shown, ++seed), shown);
+    return arriving->update_maps(0, sim::photograph(world_with_hands, samples, shown, ++seed), shown);
   }
 
-  sim::World world = test::small_world(), stage;
+  sim::World world = test::small_world(), world_with_hands;
   scene::Scene scene;
   scene::PosedScene posed;
   sim::Samples samples;
@@ -192,11 +192,11 @@ TEST_F(ArrivingTest, ShadowIsFoundInOneFrameAndForgottenInTwo) {
   Room room;
   room.begin("coat");
   const Imager& projector = room.world.rig.projectors[0];
-  room.trace({Room::hand(room.p_eye(projector), {0, 1, 0}, 0.55)});
+  room.trace({Room::hand(room.p_viewpoint(projector), {0, 1, 0}, 0.55)});
   ASSERT_TRUE(room.frame(room.images()));
   for (int k = 0; k < 3; ++k) room.frame(room.images());
   const cv::Mat map = room.arriving->map(0);
-  const sim::Truth truth(room.stage);
+  const sim::Truth truth(room.world_with_hands);
   int shaded = 0, lit = 0;
   cv::Mat hand(map.size(), CV_8U, cv::Scalar(0)), wall = hand.clone(), near;
   for (int row = 0; row < map.rows; ++row)
@@ -228,7 +228,7 @@ TEST_F(ArrivingTest, ShadowIsFoundInOneFrameAndForgottenInTwo) {
 TEST_F(ArrivingTest, HandBeforeTheCameraIsNoShadow) {
   Room room;
   room.begin("coat");
-  const Vector3d p_camera = room.p_eye(room.world.rig.cameras[0]);
+  const Vector3d p_camera = room.p_viewpoint(room.world.rig.cameras[0]);
   for (int k = 0; k < 4; ++k) {
     room.trace({Room::hand(p_camera, {0.02 * k, 1, 0}, 0.3)});
     EXPECT_FALSE(room.frame(room.images())) << k;
@@ -247,7 +247,7 @@ TEST_F(ArrivingTest, NeitherNoiseNorMovingPartsNorALostFrameAreShadows) {
   }
   const auto shown = room.images();
   const cv::Mat black(480, 640, CV_8U, cv::Scalar(0));
-  room.arriving->see(0, black, shown);
+  room.arriving->update_maps(0, black, shown);
   EXPECT_FALSE(room.frame(room.images()));
   EXPECT_EQ(cv::norm(room.images()[0], shown[0], cv::NORM_INF), 0);
 }
@@ -261,8 +261,8 @@ TEST_F(ArrivingTest, WhatIsKnownMovesWithThePrototype) {
   room.arriving->place(0, room.renderer->illuminated_patches(0, room.posed, 8));
   room.trace({});
   EXPECT_FALSE(room.frame(room.images()));
-  room.trace(
-      {Room::hand(room.p_eye(room.world.rig.projectors[1]), {0, 1, 0}, 0.35)});  // the camera does not see it
+  room.trace({Room::hand(room.p_viewpoint(room.world.rig.projectors[1]), {0, 1, 0},
+                         0.35)});  // the camera does not see it
   EXPECT_TRUE(room.frame(room.images()));
   for (int k = 0; k < 2; ++k) room.frame(room.images());
   EXPECT_GT(cv::countNonZero(room.arriving->map(1) == 0), 20);

@@ -58,8 +58,8 @@ inline Mesh coloured(Mesh mesh, const Eigen::Vector3f& colour, bool unlit = true
 }
 
 inline Imager imager_at(
-    const std::string& name, int width, int height, const Vector3d& p_eye, std::vector<double> lens) {
-  Imager imager{name, width, height, {}, looking_at(p_eye, {0, 0, 0}, k_up)};
+    const std::string& name, int width, int height, const Vector3d& p_viewpoint, std::vector<double> lens) {
+  Imager imager{name, width, height, {}, looking_at(p_viewpoint, {0, 0, 0}, k_up)};
   imager.lens = Lens::create("LENSMODEL_OPENCV4", std::move(lens)).value();
   return imager;
 }
@@ -74,8 +74,8 @@ inline Imager projector_right() {
 inline Imager camera() {
   return imager_at("camera0", 640, 480, {0.05, -0.2, -1.3}, {1000, 1000, 320, 240, -0.2, 0.1, 0.001, 0.001});
 }
-inline Imager viewer_from(const Vector3d& p_eye) {
-  return viewer_imager(looking_at(p_eye, {0, 0, 0}, k_up).inverse(), 640, 480, 35);
+inline Imager viewer_from(const Vector3d& p_viewpoint) {
+  return viewer_imager(looking_at(p_viewpoint, {0, 0, 0}, k_up).inverse(), 640, 480, 35);
 }
 
 inline Rig two_projectors() {

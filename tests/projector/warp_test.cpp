@@ -77,12 +77,12 @@ scene::Scene wall_with(scene::Mode mode) {
 Vector3d on_plane(const Vector3d& p, const Vector3d& d, double z) { return p + (z - p.z()) / d.z() * d; }
 
 // First pass for a view part: its image from the viewer's position.
-cv::Mat eye_image(const Imager& viewer) {
-  const Vector3d p_eye = viewer.imager_from_world.inverse().translation;
+cv::Mat viewer_image(const Imager& viewer) {
+  const Vector3d p_viewpoint = viewer.imager_from_world.inverse().translation;
   cv::Mat image(viewer.height, viewer.width, CV_32FC3);
   for (int row = 0; row < image.rows; ++row)
     for (int column = 0; column < image.cols; ++column) {
-      const Vector3d p = on_plane(p_eye, viewer.ray(Vector2d(column, row))->d, -k_stand_off);
+      const Vector3d p = on_plane(p_viewpoint, viewer.ray(Vector2d(column, row))->d, -k_stand_off);
       const Vector3d rgb = pattern_rgb(p.x(), p.y());
       image.at<cv::Vec3f>(row, column) = cv::Vec3d(rgb[2], rgb[1], rgb[0]);
     }
@@ -98,14 +98,14 @@ struct Warp {
 Warp warp_of(const Imager& projector, const Imager& viewer, scene::Mode mode, const Vector2d& shift_px) {
   Warp warp{cv::Mat(projector.height, projector.width, CV_32FC2, cv::Scalar::all(-1e4)),
             cv::Mat::zeros(projector.height, projector.width, CV_8U)};
-  const Vector3d p_eye = viewer.imager_from_world.inverse().translation;
+  const Vector3d p_viewpoint = viewer.imager_from_world.inverse().translation;
   for (int row = 0; row < projector.height; ++row)
     for (int column = 0; column < projector.width; ++column) {
       const auto ray = projector.ray(Vector2d(column, row) + shift_px);
       if (!ray) continue;
       const Vector3d p_wall = on_plane(ray->p_origin, ray->d, 0);
       const Vector3d p_part =
-          mode == scene::Mode::view ? on_plane(p_eye, p_wall - p_eye, -k_stand_off) : p_wall;
+          mode == scene::Mode::view ? on_plane(p_viewpoint, p_wall - p_viewpoint, -k_stand_off) : p_wall;
       const Vector2d at(p_part.x() / k_part[0] + 0.5, p_part.y() / k_part[1] + 0.5);
       const bool on_wall = std::abs(p_wall.x()) < k_wall[0] / 2 && std::abs(p_wall.y()) < k_wall[1] / 2;
       if (!on_wall || at.minCoeff() < 0 || at.maxCoeff() > 1) continue;
@@ -178,7 +178,7 @@ TEST_F(WarpTest, IsWhatRemapMakesOfTheLens) {
   const Imager viewer =
       viewer_imager(looking_at({0.2, -0.3, -1.2}, {0, 0, 0}, {0, -1, 0}).inverse(), 2400, 1800, 25);
   for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
-    const cv::Mat source = mode == scene::Mode::view ? eye_image(viewer) : pattern_image();
+    const cv::Mat source = mode == scene::Mode::view ? viewer_image(viewer) : pattern_image();
     const scene::Scene scene = wall_with(mode);
     const scene::PosedScene posed{Pose(), {{"part", "a", Pose()}}};
     for (const Imager& projector : projectors) {

@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 
 const Vector3d k_up = Vector3d::UnitZ();
 
-SurfaceMaterial substance(const Vector3d& base_bgr, double metallic, double roughness) {
+SurfaceMaterial material(const Vector3d& base_bgr, double metallic, double roughness) {
   SurfaceMaterial out;
   out.base = base_bgr;
   out.metallic = metallic;
@@ -40,14 +40,14 @@ TEST(ReferenceBrdf, ALampHeadOnIsMirroredAsGgxSays) {
   scene::RoomLight room;
   room.lamps = {{k_up, Vector3d(0.3, 0.2, 0.1)}};
   // pi D V = 1 / (4 alpha^2) when light, viewing direction and normal are the same; alpha = 0.5^2.
-  const Vector3d metal = shaded(substance({0.2, 0.4, 0.8}, 1, 0.5), k_up, k_up, room);
+  const Vector3d metal = shaded(material({0.2, 0.4, 0.8}, 1, 0.5), k_up, k_up, room);
   EXPECT_TRUE(test::near(metal, 4 * Vector3d(0.2 * 0.1, 0.4 * 0.2, 0.8 * 0.3), 1e-9));
   // 4 % reflected white light, over the remaining diffuse colour.
-  const Vector3d gloss = shaded(substance({0.2, 0.4, 0.8}, 0, 0.5), k_up, k_up, room);
+  const Vector3d gloss = shaded(material({0.2, 0.4, 0.8}, 0, 0.5), k_up, k_up, room);
   EXPECT_NEAR(gloss.x(), 0.1 * (0.96 * 0.2 + 0.04 * 4), 1e-9);
   // A lamp has a size, so smoother surfaces do not differ.
   const auto smooth = [&](double roughness) {
-    return shaded(substance({1, 1, 1}, 1, roughness), k_up, k_up, room);
+    return shaded(material({1, 1, 1}, 1, roughness), k_up, k_up, room);
   };
   EXPECT_TRUE(test::near(smooth(0.01), smooth(0.2), 1e-9));
 }
@@ -55,8 +55,8 @@ TEST(ReferenceBrdf, ALampHeadOnIsMirroredAsGgxSays) {
 TEST(ReferenceBrdf, InEvenLightNoMetalIsBrighterThanItAndASmoothOneIsAsBright) {
   for (const double roughness : {0.05, 0.2, 0.5, 1.0})
     for (const double degrees : {0.0, 40.0, 70.0}) {
-      const Vector3d d_eye = tilted(degrees);
-      const double white_metal = shaded(substance({1, 1, 1}, 1, roughness), k_up, d_eye, even_light(0.5)).x();
+      const Vector3d d_view = tilted(degrees);
+      const double white_metal = shaded(material({1, 1, 1}, 1, roughness), k_up, d_view, even_light(0.5)).x();
       EXPECT_LT(white_metal, 0.5 * 1.005) << roughness << " " << degrees;
       if (roughness <= 0.2) {
         EXPECT_GT(white_metal, 0.5 * 0.97) << roughness << " " << degrees;
@@ -67,9 +67,9 @@ TEST(ReferenceBrdf, InEvenLightNoMetalIsBrighterThanItAndASmoothOneIsAsBright) {
 // The reflected soft light as a sum over directions of the hemisphere, without half vectors.
 Vector3d mirrored_by_rings(const SurfaceMaterial& s,
                            const Vector3d& n,
-                           const Vector3d& d_eye,
+                           const Vector3d& d_view,
                            const scene::RoomLight& room) {
-  const double alpha2 = std::pow(s.roughness, 4), nv = n.dot(d_eye);
+  const double alpha2 = std::pow(s.roughness, 4), nv = n.dot(d_view);
   const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
   constexpr int k_rings = 500, k_steps = 600;
   Vector3d sum = Vector3d::Zero();
@@ -78,7 +78,7 @@ Vector3d mirrored_by_rings(const SurfaceMaterial& s,
       const double nl = (i + 0.5) / k_rings, ring = std::sqrt(1 - nl * nl),
                    angle = 2 * M_PI * (k + 0.5) / k_steps;
       const Vector3d d = ring * (std::cos(angle) * d_u + std::sin(angle) * d_v) + nl * n;
-      const Vector3d h = (d + d_eye).normalized();
+      const Vector3d h = (d + d_view).normalized();
       const double peak = 1 - (1 - alpha2) * std::pow(n.dot(h), 2);
       const double masked =
           nl * std::sqrt(nv * nv + alpha2 * (1 - nv * nv)) + nv * std::sqrt(nl * nl + alpha2 * (1 - nl * nl));
@@ -99,7 +99,7 @@ TEST(ReferenceBrdf, MirroredSoftLightIsItsSumOverDirections) {
   double worst = 0;
   for (const double roughness : {0.25, 0.5, 0.8})
     for (const double degrees : {10.0, 45.0, 70.0}) {
-      const SurfaceMaterial metal = substance({0.3, 0.6, 0.9}, 1, roughness);
+      const SurfaceMaterial metal = material({0.3, 0.6, 0.9}, 1, roughness);
       room.d_up_world = Vector3d(-0.9, 0.3, 0.1).normalized();
       const Vector3d found = shaded(metal, k_up, tilted(degrees), room);
       const Vector3d expected = mirrored_by_rings(metal, k_up, tilted(degrees), room);
@@ -111,8 +111,8 @@ TEST(ReferenceBrdf, MirroredSoftLightIsItsSumOverDirections) {
 TEST(ReferenceBrdf, OcclusionKeepsSoftLightAloneAndEmissionIsAdded) {
   scene::RoomLight room = even_light(0.4), lamp_alone;
   room.lamps = lamp_alone.lamps = {{tilted(30), Vector3d::Constant(0.5)}};
-  SurfaceMaterial open = substance({0.2, 0.4, 0.6}, 0.5, 0.4), closed = open;
-  closed.open = 0;
+  SurfaceMaterial open = material({0.2, 0.4, 0.6}, 0.5, 0.4), closed = open;
+  closed.occlusion = 0;
   closed.emitted = {0.1, 0.2, 0.3};
   EXPECT_TRUE(test::near(shaded(closed, k_up, tilted(-20), room),
                          shaded(open, k_up, tilted(-20), lamp_alone) + Vector3d(0.1, 0.2, 0.3), 1e-9));
@@ -140,10 +140,10 @@ TEST(ReferenceBrdf, TexturesAndFactorsAreMultipliedAndRepeat) {
   const SurfaceMaterial found = surface_material(mesh, 0, {0.25F, 0.25F});
   EXPECT_NEAR(found.metallic, 0.5 * 0.2, 1e-6);
   EXPECT_NEAR(found.roughness, 0.4, 1e-6);
-  EXPECT_NEAR(found.open, 1 - 0.5 * 0.8, 1e-6);
+  EXPECT_NEAR(found.occlusion, 1 - 0.5 * 0.8, 1e-6);
   EXPECT_TRUE(test::near(found.emitted, Vector3d(0, 0.5, 1), 1e-6));
   EXPECT_TRUE(test::near(found.along, Vector3d(0.25, -0.25, 1), 1e-6));
-  EXPECT_FALSE(found.is_plain);
+  EXPECT_FALSE(found.is_diffuse);
   for (const Eigen::Vector2f& uv : {Eigen::Vector2f(0.75F, 0.75F), {1.75F, -0.25F}}) {
     EXPECT_NEAR(surface_material(mesh, 0, uv).roughness, 1, 1e-6);
   }

@@ -51,8 +51,8 @@ scene::PosedScene posed(const World& world) {
   return {world.world_from_prototype, {{"part", "a", world.world_from_prototype}}};
 }
 
-Imager eye_at(const Eigen::Vector3d& p_eye) {
-  return viewer_imager(looking_at(p_eye, {0, 0, 1}, -Eigen::Vector3d::UnitY()).inverse(), 320, 240, 40);
+Imager viewer_at(const Eigen::Vector3d& p_viewpoint) {
+  return viewer_imager(looking_at(p_viewpoint, {0, 0, 1}, -Eigen::Vector3d::UnitY()).inverse(), 320, 240, 40);
 }
 
 // Centroid of the covered pixels and their number; pixels at edges count by their share.
@@ -69,7 +69,7 @@ TEST(ReferenceRenderer, LightOfAViewPartLiesWhereTheEyeSeesItOnThePlane) {
   // The part is 0.1 m in front of the plane, 0.08 x 0.06 m. Seen by a viewer at x = 0.5 and 1 m from the
   // plane, it covers a rectangle that is 1 / 0.9 times as large, shifted by 0.5 * (1 - 1 / 0.9).
   const World world = plane_world(scene::Mode::view, sheet_at(0.08, 0.06, 0.05, -0.1));
-  const ReferenceRenderer reference(world, posed(world), eye_at({0.5, 0, 0}));
+  const ReferenceRenderer reference(world, posed(world), viewer_at({0.5, 0, 0}));
   const PartImage image = reference.projector_image(0);
   const auto [centre, area] = centroid(image.cover);
   const double x_plane = 0.5 + (0.05 - 0.5) / 0.9;
@@ -81,7 +81,7 @@ TEST(ReferenceRenderer, LightOfAViewPartLiesWhereTheEyeSeesItOnThePlane) {
 
 TEST(ReferenceRenderer, AViewPartBehindThePlaneGetsNoLightAndIsNotSeen) {
   const World world = plane_world(scene::Mode::view, sheet_at(0.08, 0.06, 0.05, 0.1));
-  const ReferenceRenderer reference(world, posed(world), eye_at({0.5, 0, 0}));
+  const ReferenceRenderer reference(world, posed(world), viewer_at({0.5, 0, 0}));
   EXPECT_EQ(cv::countNonZero(reference.projector_image(0).cover), 0);
   EXPECT_EQ(cv::countNonZero(reference.parts_image(world.rig.cameras[0]).cover), 0);
   const DepthOrder order = reference.depth_order(world.rig.cameras[0]);
@@ -91,8 +91,8 @@ TEST(ReferenceRenderer, AViewPartBehindThePlaneGetsNoLightAndIsNotSeen) {
 
 TEST(ReferenceRenderer, WhatThePrototypeHidesFromTheEyeGetsNoLight) {
   World world = plane_world(scene::Mode::view, sheet_at(0.08, 0.06, 0.05, -0.1));
-  const Imager eye = eye_at({0.5, 0, 0});
-  EXPECT_GT(cv::countNonZero(ReferenceRenderer(world, posed(world), eye).projector_image(0).cover), 500);
+  const Imager viewer = viewer_at({0.5, 0, 0});
+  EXPECT_GT(cv::countNonZero(ReferenceRenderer(world, posed(world), viewer).projector_image(0).cover), 500);
   // A flap of the prototype half way to the viewer, outside the projector's image.
   scene::Mesh flapped = *world.objects[0].mesh;
   const scene::Mesh flap = sheet_at(0.12, 0.12, 0.35, -0.7);
@@ -101,14 +101,14 @@ TEST(ReferenceRenderer, WhatThePrototypeHidesFromTheEyeGetsNoLight) {
   flapped.triangles.insert(flapped.triangles.end(), {{4, 6, 5}, {4, 7, 6}});
   flapped.triangle_materials.assign(4, 0);
   world.objects[0].mesh = std::make_shared<scene::Mesh>(flapped);
-  EXPECT_EQ(cv::countNonZero(ReferenceRenderer(world, posed(world), eye).projector_image(0).cover), 0);
+  EXPECT_EQ(cv::countNonZero(ReferenceRenderer(world, posed(world), viewer).projector_image(0).cover), 0);
 }
 
 TEST(ReferenceRenderer, SurfacePartsAreLitForEveryEyeWithinTwoMillimetresOnly) {
   for (const double z : {0.0, -0.0015, 0.0015, -0.003, 0.003}) {
     const World world = plane_world(scene::Mode::surface, sheet_at(0.08, 0.06, 0.05, z));
-    for (const double x_eye : {-0.5, 0.5}) {
-      const ReferenceRenderer reference(world, posed(world), eye_at({x_eye, 0, 0}));
+    for (const double x_viewer : {-0.5, 0.5}) {
+      const ReferenceRenderer reference(world, posed(world), viewer_at({x_viewer, 0, 0}));
       const auto [centre, area] = centroid(reference.projector_image(0).cover);
       if (std::abs(z) > 0.002) {
         EXPECT_EQ(area, 0) << "height " << z;
@@ -174,8 +174,8 @@ TEST(ReferenceRenderer, NormalsOfAMapAreLitByTheScenesRoom) {
       world.scene->light->lamps = {{d_lamp.normalized(), {0.2, 0.3, 0.4}}};
       const double nl = n.dot(d_lamp.normalized());
       for (const PartImage& image :
-           {ReferenceRenderer(world, posed(world), eye_at({0.1, 0, 0})).projector_image(0),
-            ReferenceRenderer(world, posed(world), eye_at({0.1, 0, 0})).parts_image(world.rig.cameras[0])})
+           {ReferenceRenderer(world, posed(world), viewer_at({0.1, 0, 0})).projector_image(0),
+            ReferenceRenderer(world, posed(world), viewer_at({0.1, 0, 0})).parts_image(world.rig.cameras[0])})
         for (int c = 0; c < 3; ++c)
           EXPECT_NEAR(image.light.at<cv::Vec3f>(119, 159)[c], nl * (0.4 - 0.1 * c), 1e-4);
     }

@@ -28,10 +28,10 @@ scene::Scene one_part_scene(scene::Mode mode) {
 
 // The prototype is a square of side 0.4 m at y = 1 in front of a wall. The part stands `gap` in front of the
 // prototype; half of it extends beyond the right edge.
-struct Stage {
+struct PartScene {
   sim::World world = small_world(1.5);
   scene::PosedScene parts;
-  explicit Stage(double gap, scene::Mode mode = scene::Mode::view) {
+  explicit PartScene(double gap, scene::Mode mode = scene::Mode::view) {
     world.scene = one_part_scene(mode);
     world.world_from_prototype = facing_minus_y(0, 1, 0);
     world.objects.push_back(sim::sheet("prototype", 0.4, 0.4, {}, world.world_from_prototype));
@@ -69,9 +69,9 @@ TEST(Truth, APointBehindSomethingIsNotVisible) {
 }
 
 TEST(Truth, APartIsOnSurfaceBeforeThePrototypeAndOffBeyondItsEdge) {
-  const Stage stage(0.1);
-  const Imager& camera = stage.world.rig.cameras[0];
-  const cv::Mat mask = sim::Truth(stage.world, stage.parts).part_mask(camera, "part");
+  const PartScene part_scene(0.1);
+  const Imager& camera = part_scene.world.rig.cameras[0];
+  const cv::Mat mask = sim::Truth(part_scene.world, part_scene.parts).part_mask(camera, "part");
   // The part spans x 0.1 … 0.3 m at 0.9 m; the prototype ends at x = 0.2 m at 1 m: pixel columns by hand.
   const double left = 159.5 + 400 * 0.1 / 0.9, right = 159.5 + 400 * 0.3 / 0.9, edge = 159.5 + 400 * 0.2;
   for (int c = 0; c < 320; ++c) {
@@ -83,17 +83,19 @@ TEST(Truth, APartIsOnSurfaceBeforeThePrototypeAndOffBeyondItsEdge) {
 }
 
 TEST(Truth, AShadowOfThePrototypeItselfIsOffSurface) {
-  Stage stage(0.1);
-  stage.world.rig.projectors[0].imager_from_world =
+  PartScene part_scene(0.1);
+  part_scene.world.rig.projectors[0].imager_from_world =
       looking_at({0.3, 3, 0.1}, {0, 1, 0}, Eigen::Vector3d::UnitZ());
-  const cv::Mat mask = sim::Truth(stage.world, stage.parts).part_mask(stage.world.rig.cameras[0], "part");
+  const cv::Mat mask =
+      sim::Truth(part_scene.world, part_scene.parts).part_mask(part_scene.world.rig.cameras[0], "part");
   EXPECT_EQ(cv::countNonZero(mask == 255), 0);  // illuminated from behind only
   EXPECT_GT(cv::countNonZero(mask == 128), 5000);
 }
 
 TEST(Truth, ThePrototypeHidesPartsBehindIt) {
-  const Stage stage(-0.05);
-  const cv::Mat mask = sim::Truth(stage.world, stage.parts).part_mask(stage.world.rig.cameras[0], "part");
+  const PartScene part_scene(-0.05);
+  const cv::Mat mask =
+      sim::Truth(part_scene.world, part_scene.parts).part_mask(part_scene.world.rig.cameras[0], "part");
   EXPECT_EQ(cv::countNonZero(mask == 255), 0);
   EXPECT_EQ(mask.at<std::uint8_t>(120, 230), 0);    // behind the prototype
   EXPECT_EQ(mask.at<std::uint8_t>(120, 250), 128);  // beside it
@@ -101,7 +103,7 @@ TEST(Truth, ThePrototypeHidesPartsBehindIt) {
 
 TEST(Truth, ASurfacePartMayLieUpToTwoMillimetresDeep) {
   for (const auto& [gap, seen] : {std::pair{-0.0015, true}, {-0.0025, false}}) {
-    const Stage surface(gap, scene::Mode::surface), view(gap, scene::Mode::view);
+    const PartScene surface(gap, scene::Mode::surface), view(gap, scene::Mode::view);
     const Imager& camera = surface.world.rig.cameras[0];
     EXPECT_EQ(sim::Truth(surface.world, surface.parts).part_mask(camera, "part").at<std::uint8_t>(120, 220),
               seen ? 255 : 0);
@@ -110,8 +112,9 @@ TEST(Truth, ASurfacePartMayLieUpToTwoMillimetresDeep) {
 }
 
 TEST(Truth, ObjectImageNamesTheNearestThing) {
-  const Stage stage(0.1);
-  const sim::ObjectImage seen = sim::Truth(stage.world, stage.parts).object_image(stage.world.rig.cameras[0]);
+  const PartScene part_scene(0.1);
+  const sim::ObjectImage seen =
+      sim::Truth(part_scene.world, part_scene.parts).object_image(part_scene.world.rig.cameras[0]);
   const auto name = [&](int c, int r) {
     return seen.names.at(static_cast<std::size_t>(seen.image.at<std::int16_t>(r, c)));
   };
@@ -142,8 +145,8 @@ TEST(Truth, SurfacePointsAreUniformByAreaAndOnTheMesh) {
 }
 
 TEST(Truth, AWorldWithPartsShowsThem) {
-  const Stage stage(0.1);
-  const sim::World shown = sim::with_parts(stage.world, stage.parts);
+  const PartScene part_scene(0.1);
+  const sim::World shown = sim::with_parts(part_scene.world, part_scene.parts);
   const auto landing = sim::Truth(shown).landing(shown.rig.cameras[0], {230, 120});
   ASSERT_TRUE(landing);
   EXPECT_EQ(landing->object, "part-part");

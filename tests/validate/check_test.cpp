@@ -95,12 +95,14 @@ TEST(Check, AFileSaysWhatStandsWhereAndWhatTheRendererIsNotTold) {
       test::near(loaded->posed.parts[0].world_from_part.translation, Eigen::Vector3d(1.1, 2, 3), 1e-9));
   EXPECT_TRUE(test::near(loaded->truth.find("prototype")->world_from_object.translation,
                          Eigen::Vector3d(1, 2, 3), 1e-9));
-  const Imager &true_projector = loaded->truth.rig.projectors[1], &told = loaded->told.rig.projectors[1];
-  EXPECT_EQ(told.width, 640);
-  EXPECT_EQ(loaded->told.rig.cameras[0].height, 540);
-  EXPECT_NEAR(true_projector.lens.cx() - told.lens.cx(), 0.5, 1e-9);
-  EXPECT_NEAR(true_projector.lens.cy() - told.lens.cy(), -0.25, 1e-9);
-  EXPECT_EQ(loaded->truth.rig.projectors[0].lens.values, loaded->told.rig.projectors[0].lens.values);
+  const Imager &true_projector = loaded->truth.rig.projectors[1],
+               &given = loaded->renderer_input.rig.projectors[1];
+  EXPECT_EQ(given.width, 640);
+  EXPECT_EQ(loaded->renderer_input.rig.cameras[0].height, 540);
+  EXPECT_NEAR(true_projector.lens.cx() - given.lens.cx(), 0.5, 1e-9);
+  EXPECT_NEAR(true_projector.lens.cy() - given.lens.cy(), -0.25, 1e-9);
+  EXPECT_EQ(loaded->truth.rig.projectors[0].lens.values,
+            loaded->renderer_input.rig.projectors[0].lens.values);
 
   // Without poses everything is where the world has it.
   const auto plain = load_check(written(
@@ -114,20 +116,22 @@ TEST(Check, SeveralViewersShareAnEye) {
   const char* two =
       R"([{"eye_m": [-0.3, -1, 0.6], "target_m": [0, 0, 0.4], "size": [320, 240], "fov_deg": 50},
       {"eye_m": [0.3, -2, 0.6], "target_m": [0, 0, 0.4], "size": [640, 480], "fov_deg": 34, "weight": 3}])";
-  const auto told = load_check(written(test::test_folder(), "studio",
-                                       fmt::format(R"("viewer": {}, "limits": {{"shared_mm": 1}})", two)));
-  ASSERT_TRUE(told) << told.message();
+  const auto shared = load_check(written(test::test_folder(), "studio",
+                                         fmt::format(R"("viewer": {}, "limits": {{"shared_mm": 1}})", two)));
+  ASSERT_TRUE(shared) << shared.message();
   // The weight divided by the distance from the middle of the door.
-  const Eigen::Vector3d p_middle = *scene::middle_of(*told->truth.scene, told->posed);
+  const Eigen::Vector3d p_middle = *scene::middle_of(*shared->truth.scene, shared->posed);
   const Eigen::Vector3d p_near(-0.3, -1, 0.6), p_far(0.3, -2, 0.6);
   const double near = 1 / (p_near - p_middle).norm(), far = 3 / (p_far - p_middle).norm();
   const Eigen::Vector3d p_shared = (near * p_near + far * p_far) / (near + far);
-  const auto p_eye = [](const Check& check) { return check.viewer.imager_from_world.inverse().translation; };
-  EXPECT_TRUE(test::near(p_eye(*told), p_shared, 1e-9));
-  EXPECT_EQ(told->viewer.width, 320);
-  EXPECT_NEAR(told->viewer.lens.fx(), 160 / std::tan(25 * M_PI / 180), 1e-6);
-  ASSERT_EQ(told->shares.size(), 2u);
-  EXPECT_NEAR(told->shares[1].share, far / (near + far), 1e-9);
+  const auto p_viewer = [](const Check& check) {
+    return check.viewer.imager_from_world.inverse().translation;
+  };
+  EXPECT_TRUE(test::near(p_viewer(*shared), p_shared, 1e-9));
+  EXPECT_EQ(shared->viewer.width, 320);
+  EXPECT_NEAR(shared->viewer.lens.fx(), 160 / std::tan(25 * M_PI / 180), 1e-6);
+  ASSERT_EQ(shared->shares.size(), 2u);
+  EXPECT_NEAR(shared->shares[1].share, far / (near + far), 1e-9);
 
   // The scene's own viewers, one with a cap that is in the world.
   const fs::path folder = test::test_folder();
@@ -186,7 +190,7 @@ TEST_F(CheckJudge, LightTwoPixelsBesideMissesWhatTheLightIsJudgedBy) {
       "parallax_mm": 1, "shone_mean_255": 2, "shone_over4_share": 0.005, "spill_share": 0.005}})",
                                                 k_viewer));
   Check wrong = good;
-  wrong.told.rig.projectors[0].lens.values[2] += 2;
+  wrong.renderer_input.rig.projectors[0].lens.values[2] += 2;
   expect_missed(good, wrong);
 }
 
@@ -197,7 +201,7 @@ TEST_F(CheckJudge, AnotherColourMissesWhatTheLooksAreJudgedBy) {
       "drawn_over4_share": 0.005, "drawn_inner_over4_share": 0.005}})",
                                  k_viewer));
   Check wrong = good;
-  for (scene::Variant& variant : wrong.told.scene.slots[0].variants)
+  for (scene::Variant& variant : wrong.renderer_input.scene.slots[0].variants)
     for (scene::Material& material : variant.mesh.materials) material.base_colour *= 0.9F;
   expect_missed(good, wrong);
 }
@@ -209,16 +213,16 @@ TEST_F(CheckJudge, AMapLeftOutOrAnotherLightMissesWhatTheLooksAreJudgedBy) {
       {{"rotation_wxyz": [1, 0, 0, 0], "translation_m": [-0.03, 0.06, 0.02]}}}}}}}},
       "limits": {{"drawn_inner_over4_share": 0.005}})",
                                                  scene.string(), k_viewer));
-  const auto share = [](const Check& told) { return readings(told).at("drawn_inner_over4_share"); };
+  const auto share = [](const Check& which) { return readings(which).at("drawn_inner_over4_share"); };
   EXPECT_TRUE(share(good).good()) << share(good).value;
   using Maps = scene::SurfaceMaps;
   for (const auto map : {&Maps::metallic_roughness, &Maps::normals, &Maps::occlusion, &Maps::emission}) {
     Check wrong = good;
-    (wrong.told.scene.slots[0].variants[0].mesh.materials[0].maps.*map).image.release();
+    (wrong.renderer_input.scene.slots[0].variants[0].mesh.materials[0].maps.*map).image.release();
     EXPECT_FALSE(share(wrong).good());
   }
   Check wrong = good;
-  wrong.told.scene.light->lamps[0].d_world = Eigen::Vector3d(0.5, -0.7, 0.6).normalized();
+  wrong.renderer_input.scene.light->lamps[0].d_world = Eigen::Vector3d(0.5, -0.7, 0.6).normalized();
   EXPECT_FALSE(share(wrong).good());
 }
 
@@ -229,7 +233,8 @@ TEST_F(CheckJudge, APartElsewhereMissesWhatItsPlaceIsJudgedBy) {
       "limits": {{"mask_iou": 0.97, "composite_px": 1, "depth_order_share": 0.99}})",
                                  k_viewer));
   Check wrong = good;
-  for (scene::PosedPart& part : wrong.told.posed.parts) part.world_from_part.translation.x() += 0.006;
+  for (scene::PosedPart& part : wrong.renderer_input.posed.parts)
+    part.world_from_part.translation.x() += 0.006;
   expect_missed(good, wrong);
 }
 
@@ -239,8 +244,8 @@ TEST_F(CheckJudge, LightThatEndsEarlyLeavesAGapBesideTheScreenAndLightTooBrightS
       "limits": {{"edge_gap_share": 0.12, "edge_double_share": 0.05}})",
                                                  k_viewer));
   Check aside = good, bright = good;
-  for (Imager& projector : aside.told.rig.projectors) projector.lens.values[3] += 6;
-  for (scene::Variant& variant : bright.told.scene.slots[0].variants)
+  for (Imager& projector : aside.renderer_input.rig.projectors) projector.lens.values[3] += 6;
+  for (scene::Variant& variant : bright.renderer_input.scene.slots[0].variants)
     for (scene::Material& material : variant.mesh.materials) material.base_colour *= 1.2F;
   for (const auto& [name, reading] : readings(good))
     EXPECT_TRUE(reading.good()) << name << " " << reading.value;
@@ -263,12 +268,12 @@ TEST_F(CheckJudge, AWrongResponseShowsAtTheSeams) {
       "limits": {{"seam_step_p95": 0.01, "seam_step_max": 0.02}})",
                                                  k_viewer));
   Check wrong = good;
-  for (const Imager& projector : wrong.told.rig.projectors) {
+  for (const Imager& projector : wrong.renderer_input.rig.projectors) {
     ProjectorResponse response;
     response.projector = projector.name;
     for (int i = 0; i < 256; ++i) response.red.push_back(std::pow(i / 255.0, 1.8));
     response.green = response.blue = response.red;
-    wrong.told.rig.responses.push_back(response);
+    wrong.renderer_input.rig.responses.push_back(response);
   }
   expect_missed(good, wrong);
 }
@@ -281,12 +286,12 @@ TEST_F(CheckJudge, ABlackThatNobodyMeasuredShowsAtTheSeams) {
   };
   const Check good = measured("halves");
   Check wrong = good;
-  for (const Imager& projector : wrong.told.rig.projectors) {
+  for (const Imager& projector : wrong.renderer_input.rig.projectors) {
     ProjectorResponse response;  // without a black level
     response.projector = projector.name;
     for (int i = 0; i < 256; ++i) response.red.push_back(std::pow(i / 255.0, 2.2));
     response.green = response.blue = response.red;
-    wrong.told.rig.responses.push_back(response);
+    wrong.renderer_input.rig.responses.push_back(response);
   }
   EXPECT_LT(readings(good).at("black_step_share").value, 0.2) << "half the resolution: pixels twice as wide";
   EXPECT_GT(readings(wrong).at("black_step_share").value, 0.8);

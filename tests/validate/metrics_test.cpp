@@ -35,11 +35,11 @@ sim::World plane_world() {
 }
 
 // The discs drawn directly into the projector's image (light = value), moved by `shift_px`: 8x8 sub-pixels.
-cv::Mat drawn(const AimedDots& dots, double shift_px) {
+cv::Mat drawn(const TargetDots& dots, double shift_px) {
   constexpr int k_sub = 8;
   const double radius_px = (dots.mesh.positions[1] - dots.mesh.positions[0]).norm() * k_focal_px;
   cv::Mat light(480, 640, CV_8U, cv::Scalar(0));
-  for (const Eigen::Vector3d& p : dots.p_aimed) {
+  for (const Eigen::Vector3d& p : dots.p_targets) {
     const Eigen::Vector2d centre(k_focal_px * p.x() + 319.5 + shift_px, k_focal_px * p.y() + 239.5);
     for (int y = static_cast<int>(centre.y()) - 4; y <= centre.y() + 4; ++y) {
       for (int x = static_cast<int>(centre.x()) - 4; x <= centre.x() + 4; ++x) {
@@ -58,17 +58,17 @@ cv::Mat drawn(const AimedDots& dots, double shift_px) {
 }
 
 TEST(Judge, DotsLieOnThePrototypeAndApart) {
-  const AimedDots dots = aimed_dots(plane_world(), 400, 1);
-  ASSERT_EQ(dots.p_aimed.size(), 400u);
-  for (std::size_t i = 0; i < dots.p_aimed.size(); ++i) {
-    EXPECT_NEAR(dots.p_aimed[i].z(), 0, 1e-9);
-    for (std::size_t j = 0; j < i; ++j) EXPECT_GT((dots.p_aimed[i] - dots.p_aimed[j]).norm(), 0.0075);
+  const TargetDots dots = target_dots(plane_world(), 400, 1);
+  ASSERT_EQ(dots.p_targets.size(), 400u);
+  for (std::size_t i = 0; i < dots.p_targets.size(); ++i) {
+    EXPECT_NEAR(dots.p_targets[i].z(), 0, 1e-9);
+    for (std::size_t j = 0; j < i; ++j) EXPECT_GT((dots.p_targets[i] - dots.p_targets[j]).norm(), 0.0075);
   }
 }
 
 TEST(Judge, LightWhereItWasAimedScoresNearZero) {
   const sim::World world = plane_world();
-  const AimedDots dots = aimed_dots(world, 400, 1);
+  const TargetDots dots = target_dots(world, 400, 1);
   const std::vector<cv::Mat> images = {drawn(dots, 0)};
   const Registration found = judged_registration(world, dots, images);
   EXPECT_EQ(found.unlit, 0);
@@ -77,7 +77,7 @@ TEST(Judge, LightWhereItWasAimedScoresNearZero) {
 
 TEST(Judge, AShiftOfOnePixelIsMeasuredInMillimetres) {
   const sim::World world = plane_world();
-  const AimedDots dots = aimed_dots(world, 400, 1);
+  const TargetDots dots = target_dots(world, 400, 1);
   const std::vector<cv::Mat> images = {drawn(dots, 1)};
   const Registration found = judged_registration(world, dots, images);
   EXPECT_NEAR(found.rms_mm, 1, 0.02);
@@ -86,7 +86,7 @@ TEST(Judge, AShiftOfOnePixelIsMeasuredInMillimetres) {
 
 TEST(Judge, DarknessCountsAsError) {
   const sim::World world = plane_world();
-  const AimedDots dots = aimed_dots(world, 50, 1);
+  const TargetDots dots = target_dots(world, 50, 1);
   const std::vector<cv::Mat> images = {cv::Mat(480, 640, CV_8UC3, cv::Scalar::all(0))};
   const Registration found = judged_registration(world, dots, images);
   EXPECT_EQ(found.unlit, found.points);
@@ -94,27 +94,27 @@ TEST(Judge, DarknessCountsAsError) {
 }
 
 // A viewpoint in front of the plane and to its side, looking at its middle.
-Imager eye_beside() {
+Imager viewer_beside() {
   const Pose eye_from_world = looking_at({0.5, -0.2, -0.1}, {0, 0, k_distance_m}, -Eigen::Vector3d::UnitY());
   return viewer_imager(eye_from_world.inverse(), 640, 480, 40);
 }
 
 TEST(Judge, FloatingDotsAreSeenBeforeTheirAimedPoints) {
   const sim::World world = plane_world();
-  const Imager eye = eye_beside();
-  const AimedDots dots = floating_dots(world, eye, 0.05, 100, 1);
+  const Imager viewer = viewer_beside();
+  const TargetDots dots = floating_dots(world, viewer, 0.05, 100, 1);
   ASSERT_GT(dots.p_centres.size(), 50u);
   for (std::size_t i = 0; i < dots.p_centres.size(); ++i) {
     EXPECT_NEAR(dots.p_centres[i].z(), -0.05, 1e-6) << "the plane's normal is -z";
-    const auto seen = eye.project(world.world_from_prototype * dots.p_centres[i]);
-    const auto aimed = eye.project(world.world_from_prototype * dots.p_aimed[i]);
-    EXPECT_NEAR((*seen - *aimed).norm(), 0, 1e-3);
+    const auto seen = viewer.project(world.world_from_prototype * dots.p_centres[i]);
+    const auto target = viewer.project(world.world_from_prototype * dots.p_targets[i]);
+    EXPECT_NEAR((*seen - *target).norm(), 0, 1e-3);
   }
 }
 
 TEST(Judge, LightBesideAFloatingDotIsMeasuredAsTheEyeSeesIt) {
   const sim::World world = plane_world();
-  const AimedDots dots = floating_dots(world, eye_beside(), 0.05, 100, 1);
+  const TargetDots dots = floating_dots(world, viewer_beside(), 0.05, 100, 1);
   const std::vector<cv::Mat> right = {drawn(dots, 0)}, beside = {drawn(dots, 1)};
   EXPECT_LT(judged_registration(world, dots, right).rms_mm, 0.03);
   const Registration found = judged_registration(world, dots, beside);

@@ -1,5 +1,5 @@
 // The rectangles in which a projector may give light.
-#include "projector/light_layer.h"
+#include "projector/light_passes.h"
 
 #include <gtest/gtest.h>
 

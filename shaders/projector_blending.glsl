@@ -8,31 +8,31 @@ layout(binding = k_pixel_maps_unit) uniform sampler2DArray s_pixel_maps;
 // For each projector, over its image: the share of its light that arrives.
 layout(binding = k_occlusion_unit) uniform sampler2DArray s_arriving;
 // For each projector, over its id image: feathering weight near edges and shadows.
-layout(binding = k_edge_fade_unit) uniform sampler2DArray s_kept;
+layout(binding = k_edge_fade_unit) uniform sampler2DArray s_edge_fade;
 uniform int u_projector_count;
 
 // Smallest feathering weight beside shadows, relative to elsewhere. The remaining step where light ends is
 // below it. With a smaller value, light would change between projectors within a few pixels where two of them
 // have shadows.
-const float k_least_kept = 0.01;
+const float k_least_edge_fade = 0.01;
 const float k_least_share = 1e-4;  // weight at the image border, so that a projector that is alone there
                                    // still gives its light
 
 // The pixel of a projector's own image for a tangent.
-vec2 pixel_of(Sight projector, vec2 tangent) {
+vec2 pixel_of(Viewpoint projector, vec2 tangent) {
   vec2 node = (tangent - projector.map.xy) * projector.map.zw;
   ivec2 nodes = textureSize(s_pixel_maps, 0).xy;
   ivec2 first = ivec2(floor(node));
   if (any(lessThan(first, ivec2(0))) || any(greaterThan(first, nodes - 2))) return vec2(-1e6);
   int layer = int(projector.quality.z);
-  return between(texelFetch(s_pixel_maps, ivec3(first, layer), 0).xy,
+  return bilinear(texelFetch(s_pixel_maps, ivec3(first, layer), 0).xy,
                  texelFetch(s_pixel_maps, ivec3(first + ivec2(1, 0), layer), 0).xy,
                  texelFetch(s_pixel_maps, ivec3(first + ivec2(0, 1), layer), 0).xy,
                  texelFetch(s_pixel_maps, ivec3(first + ivec2(1, 1), layer), 0).xy, node - vec2(first));
 }
 
 // Vignetting gain of a projector's pixel (core/photometric_response.h).
-float vignetting(Sight projector, vec2 px) {
+float vignetting(Viewpoint projector, vec2 px) {
   vec2 half_size = 0.5 * projector.size.zw;
   vec2 q = (px + 0.5 - half_size) / length(half_size);
   float q2 = dot(q, q);
@@ -58,14 +58,14 @@ Place place_at(Hit hit, vec3 d) {
 
 // Ratio of the area of a defocused pixel at this depth to that of a sharp one. A square of side 1 has a
 // variance of 1 / 12, a disc of diameter d one of d^2 / 16.
-float spread(Sight projector, float depth) {
+float spread(Viewpoint projector, float depth) {
   // The division comes last, because drivers divide inexactly.
   float disc = (projector.focus.x * depth - projector.focus.y) / depth;
   return 1.0 + 0.75 * disc * disc;
 }
 
 // How projector j lights a place.
-struct Reach {
+struct Illumination {
   float quality;     // pixels for each square metre, fewer where they are out of focus; multiplied by the
                      // cosine a second time to avoid grazing light; fades towards the image's border and near
                      // depth edges; 0 where its light does not fall: turned away, outside the image, in a
@@ -75,39 +75,41 @@ struct Reach {
   float arriving;    // share of its light that arrives at p, 0 to 1; a person's shadow takes the rest
 };
 
-// `is_seen`: the place is known to be visible from the projector.
-Reach reach(int j, Place place, bool is_seen) {
-  Sight projector = sight_at(j);
-  vec3 to_eye = projector.p_eye.xyz - place.p;
-  float distance_2 = dot(to_eye, to_eye);
-  vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
-  if (dot(place.d_flat, to_eye) <= 0.0 || q.z <= 0.0) return Reach(0.0, 0.0, 1.0);
+// `is_visible`: the place is known to be visible from the projector.
+Illumination illumination_from(int j, Place place, bool is_visible) {
+  Viewpoint projector = viewpoint_at(j);
+  vec3 to_projector = projector.p_origin.xyz - place.p;
+  float distance_2 = dot(to_projector, to_projector);
+  vec3 q = (projector.pinhole_from_scene * vec4(place.p, 1)).xyz;
+  if (dot(place.d_flat, to_projector) <= 0.0 || q.z <= 0.0) return Illumination(0.0, 0.0, 1.0);
   const float k_least_cosine = 0.01;  // for a smooth normal that faces away although its triangle does not
-  float cosine = max(k_least_cosine, dot(place.d_smooth, to_eye) * inversesqrt(distance_2));
+  float cosine = max(k_least_cosine, dot(place.d_smooth, to_projector) * inversesqrt(distance_2));
   vec2 px = pixel_of(projector, q.xy / q.z);
   vec2 last = projector.size.zw - 0.5;
   float gain = vignetting(projector, clamp(px, vec2(-0.5), last));
-  Reach reach = Reach(0.0, cosine / distance_2 * max(gain, 0.05), 1.0);
+  Illumination illumination = Illumination(0.0, cosine / distance_2 * max(gain, 0.05), 1.0);
   vec2 inside = min(px + 0.5, last - px);
   float border = min(inside.x, inside.y);
-  if (border < 0.0 || (!is_seen && is_hidden(s_projector_ids, projector, place.p))) return reach;
+  if (border < 0.0 || (!is_visible && is_hidden(s_projector_ids, projector, place.p))) return illumination;
   float soft = smoothstep(0.0, projector.quality.y, border);
   if (u_projector_count > 1) {
     vec2 texel = projector.focal_centre.xy * q.xy / q.z + projector.focal_centre.zw + 0.5;
-    float kept = texture(s_kept, vec3(texel / float(k_block) / vec2(textureSize(s_kept, 0).xy), projector.quality.z)).r;
-    soft *= mix(k_least_kept, 1.0, kept);
+    vec2 block = texel / float(k_block) / vec2(textureSize(s_edge_fade, 0).xy);
+    float kept = texture(s_edge_fade, vec3(block, projector.quality.z)).r;
+    soft *= mix(k_least_edge_fade, 1.0, kept);
   }
   soft = max(k_least_share, soft);
-  reach.arriving = texture(s_arriving, vec3((px + 0.5) / projector.size.zw, projector.quality.z)).r;
-  reach.quality = soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2 / spread(projector, q.z);
-  return reach;
+  illumination.arriving = texture(s_arriving, vec3((px + 0.5) / projector.size.zw, projector.quality.z)).r;
+  illumination.quality =
+      soft * cosine * cosine * projector.quality.x * projector.quality.x / distance_2 / spread(projector, q.z);
+  return illumination;
 }
 
-// Whether projector j's light falls on a place. Cheaper than reach(j, place, false).quality > 0.
+// Whether projector j's light falls on a place. Cheaper than illumination_from(j, place, false).quality > 0.
 bool reaches(int j, Place place) {
-  Sight projector = sight_at(j);
-  vec3 q = (projector.sight_from_scene * vec4(place.p, 1)).xyz;
-  if (dot(place.d_flat, projector.p_eye.xyz - place.p) <= 0.0 || q.z <= 0.0) return false;
+  Viewpoint projector = viewpoint_at(j);
+  vec3 q = (projector.pinhole_from_scene * vec4(place.p, 1)).xyz;
+  if (dot(place.d_flat, projector.p_origin.xyz - place.p) <= 0.0 || q.z <= 0.0) return false;
   vec2 px = pixel_of(projector, q.xy / q.z);
   vec2 inside = min(px + 0.5, projector.size.zw - 0.5 - px);
   return min(inside.x, inside.y) >= 0.0 && !is_hidden(s_projector_ids, projector, place.p);
@@ -115,18 +117,18 @@ bool reaches(int j, Place place) {
 
 bool is_reached(Place place) {
   int j = 0;
-  bool is_lit = false;
+  bool is_found = false;
   do {
-    is_lit = reaches(j, place);
-  } while (!is_lit && ++j < u_projector_count);
-  return is_lit;
+    is_found = reaches(j, place);
+  } while (!is_found && ++j < u_projector_count);
+  return is_found;
 }
 
 // The part of the light that projector i gives at a place that it sees.
 struct Share {
   float share;          // share of the light there; the arriving shares of all projectors that reach the
                         // place sum to one
-  float irradiance;     // as in Reach
+  float irradiance;     // as in Illumination
   float missing_black;  // missing irradiance of black levels: from projectors that do not reach the place or
                         // are blocked
   float blocked_black;  // the part of missing_black that a person's shadow blocks
@@ -136,30 +138,33 @@ struct Share {
 // little that nothing flashes when the shadow goes, and enough for a camera to see that the shadow has gone.
 // Where no other projector reaches, it gives all its light. Weights fall exponentially with the blocked
 // share, so that the transition is equally smooth where others hardly reach.
-const float k_blocked = 1e-3;   // weight of a blocked projector against others
-const float k_watch = 0.07;     // share of the light that all blocked projectors together keep as a probe
-const float k_well_in = 0.25;   // share of the quality above which a projector keeps its full probe share
+const float k_blocked = 1e-3;      // weight of a blocked projector against others
+const float k_probe_share = 0.07;  // share of the light that all blocked projectors together keep as a probe
+// Share of the quality above which a projector keeps its full probe share.
+const float k_full_probe_quality = 0.25;
 
 // Blending weight of a projector.
-float weight_of(Reach reach) { return reach.quality * pow(k_blocked, 1.0 - reach.arriving); }
+float weight_of(Illumination illumination) {
+  return illumination.quality * pow(k_blocked, 1.0 - illumination.arriving);
+}
 
 Share share_of(int i, Place place) {
-  Reach own = reach(i, place, true);
+  Illumination own = illumination_from(i, place, true);
   float weight = weight_of(own), sum = weight, quality = own.quality;
   float own_blocked = 1.0 - own.arriving, blocked = own.quality > 0.0 ? own_blocked : 0.0;
-  float black = sight_at(i).quality.w * own.irradiance;
+  float black = viewpoint_at(i).quality.w * own.irradiance;
   Share share = Share(0.0, own.irradiance, own.quality > 0.0 ? 0.0 : black, black * blocked);
   int j = i == 0 ? 1 : 0;  // the other projectors
   if (u_projector_count > 1) {
     do {
-      Reach reach = reach(j, place, false);
-      bool is_reached = reach.quality > 0.0;
-      sum += weight_of(reach);
-      quality += reach.quality;
-      black = sight_at(j).quality.w * reach.irradiance;
+      Illumination illumination = illumination_from(j, place, false);
+      bool is_reached = illumination.quality > 0.0;
+      sum += weight_of(illumination);
+      quality += illumination.quality;
+      black = viewpoint_at(j).quality.w * illumination.irradiance;
       if (is_reached) {
-        blocked += 1.0 - reach.arriving;
-        share.blocked_black += black * (1.0 - reach.arriving);
+        blocked += 1.0 - illumination.arriving;
+        share.blocked_black += black * (1.0 - illumination.arriving);
       } else {
         share.missing_black += black;
       }
@@ -168,8 +173,9 @@ Share share_of(int i, Place place) {
   }
   share.missing_black += share.blocked_black;
   if (sum == 0.0) return share;
-  float watch = k_watch * own_blocked / max(1.0, blocked) * min(1.0, own.quality / (k_well_in * quality));
-  share.share = max(weight / sum, watch);
+  float probe =
+      k_probe_share * own_blocked / max(1.0, blocked) * min(1.0, own.quality / (k_full_probe_quality * quality));
+  share.share = max(weight / sum, probe);
   return share;
 }
 

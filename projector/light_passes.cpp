@@ -1,4 +1,4 @@
-#include "projector/light_layer.h"
+#include "projector/light_passes.h"
 
 #include <algorithm>
 
@@ -41,43 +41,45 @@ void PlacesByMode::divide(std::span<const cv::Rect> of_view, std::span<const cv:
   for (const cv::Rect& s : of_surface) add_outside(s, both, &surface);
 }
 
-Result<LightLayer> LightLayer::link(Defines looks, bool by_measurement) {
+Result<LightPasses> LightPasses::link(Defines shading_defines, bool by_measurement) {
   using enum Resource;
-  LightLayer layer;
+  LightPasses passes;
   const Defines balance = by_measurement ? Defines{Define::by_measurement} : Defines{};
-  const Defines drawing = looks + balance;
+  const Defines drawing = shading_defines + balance;
   const std::vector<Resource> rays = {scene, viewpoints, lens, projector};
-  LIMN_TRY(layer.hits_,
+  LIMN_TRY(passes.hits_,
            ComputePass::link({.shader = "light_hits.comp", .reads = rays, .writes = {hit_cache}}));
-  LIMN_TRY(layer.unknown_,
-           ComputePass::link({.shader = "light_unknown.comp", .reads = {hit_cache}, .writes = {work_list}}));
   LIMN_TRY(
-      layer.listed_hits_,
-      ComputePass::link(
-          {.shader = "light_hits.comp", .defines = {Define::listed}, .reads = rays, .writes = {hit_cache}}));
-  LIMN_TRY(layer.shares_, ComputePass::link({.shader = "light_shares.comp",
-                                             .defines = balance,
-                                             .reads = {scene, viewpoints, occlusion, lens, projector,
-                                                       hit_cache, light_balance, target},
-                                             .writes = {hit_cache, target}}));
-  LIMN_TRY(layer.where_edges_, ComputePass::link({.shader = "edges.comp",
-                                                  .defines = {Define::known_shares},
+      passes.cache_misses_,
+      ComputePass::link({.shader = "hit_cache_misses.comp", .reads = {hit_cache}, .writes = {work_list}}));
+  LIMN_TRY(passes.listed_hits_, ComputePass::link({.shader = "light_hits.comp",
+                                                   .defines = {Define::work_list},
+                                                   .reads = rays,
+                                                   .writes = {hit_cache}}));
+  LIMN_TRY(passes.shares_, ComputePass::link({.shader = "light_shares.comp",
+                                              .defines = balance,
+                                              .reads = {scene, viewpoints, occlusion, lens, projector,
+                                                        hit_cache, light_balance, target},
+                                              .writes = {hit_cache, target}}));
+  LIMN_TRY(passes.find_edges_, ComputePass::link({.shader = "edges.comp",
+                                                  .defines = {Define::cached_shares},
                                                   .reads = {light, hit_cache},
                                                   .writes = {work_list, deferred_list}}));
-  LIMN_TRY(layer.rest_,
-           ComputePass::link({.shader = "light_rest.comp",
+  LIMN_TRY(passes.edges_deferred_,
+           ComputePass::link({.shader = "light_edges_deferred.comp",
                               .defines = drawing + Defines{Define::view_parts, Define::surface_parts},
                               .reads = {scene, viewpoints, occlusion, lens, room_light, projector, hit_cache,
                                         light_balance},
                               .writes = {target}}));
   const Defines modes[] = {
       {Define::view_parts}, {Define::surface_parts}, {Define::view_parts, Define::surface_parts}};
-  for (std::size_t i = 0; i < layer.modes_.size(); ++i) {
-    ByMode& mode = layer.modes_[i];
-    LIMN_TRY(mode.where, ComputePass::link({.shader = "light_where.comp",
-                                            .defines = modes[i],
-                                            .reads = {scene, viewpoints, projector, hit_cache, light_balance},
-                                            .writes = {work_list}}));
+  for (std::size_t i = 0; i < passes.modes_.size(); ++i) {
+    ByMode& mode = passes.modes_[i];
+    LIMN_TRY(mode.find_candidates,
+             ComputePass::link({.shader = "light_candidates.comp",
+                                .defines = modes[i],
+                                .reads = {scene, viewpoints, projector, hit_cache, light_balance},
+                                .writes = {work_list}}));
     const std::vector<Resource> reads = {scene,     viewpoints, lens,         room_light,
                                          projector, hit_cache,  light_balance};
     LIMN_TRY(mode.centre, ComputePass::link({.shader = "light_centre.comp",
@@ -89,14 +91,14 @@ Result<LightLayer> LightLayer::link(Defines looks, bool by_measurement) {
                                             .reads = reads,
                                             .writes = {target, deferred_list}}));
   }
-  return layer;
+  return passes;
 }
 
-void LightLayer::draw(const Target& target,
-                      const PlacesByMode& places,
-                      const Smoothing& smoothing,
-                      const Resources& resources,
-                      PassTimes* times) {
+void LightPasses::draw(const Target& target,
+                       const PlacesByMode& places,
+                       const Smoothing& smoothing,
+                       const Resources& resources,
+                       PassTimes* times) {
   const ImageAt drawn(k_target_image, target.light, GL_RGBA32F);
   const TextureAt light(k_light_unit, target.light);
   const Resources with_target = resources.with(Resource::target, drawn).with(Resource::light, light);
@@ -106,86 +108,86 @@ void LightLayer::draw(const Target& target,
     clear_light(target.light, target.size, parted);
   });
   find_hits(drawing);
-  list_lit(drawing);
+  list_candidates(drawing);
   draw_centres(drawing);
   list_edges(drawing);
   draw_edges(drawing);
 }
 
 // Computes what the pixel centres see, where the hit cache does not hold it yet.
-void LightLayer::find_hits(const Drawing& drawing) {
+void LightPasses::find_hits(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "hits at pixel centres");
-  PixelList& unknown = start_deferred(drawing);
-  const Resources resources = drawing.resources.with(Resource::work_list, unknown);
-  const ComputePass& pass = drawing.target.is_unknown ? hits_ : unknown_;
+  PixelList& misses = start_deferred(drawing);
+  const Resources resources = drawing.resources.with(Resource::work_list, misses);
+  const ComputePass& pass = drawing.target.is_cache_outdated ? hits_ : cache_misses_;
   for_modes(drawing.places,
-            [&](ByMode&, const std::vector<cv::Rect>& parted) { pass.look_through(parted, resources); });
-  if (!drawing.target.is_unknown) listed_hits_.work_through(unknown, resources);
+            [&](ByMode&, const std::vector<cv::Rect>& parted) { pass.run_over_rects(parted, resources); });
+  if (!drawing.target.is_cache_outdated) listed_hits_.run_over_list(misses, resources);
 }
 
-void LightLayer::list_lit(const Drawing& drawing) {
+void LightPasses::list_candidates(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "where there may be light");
   for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>& parted) {
-    mode.lit.start(drawing.target.size.area());
-    mode.where.look_through(parted, drawing.resources.with(Resource::work_list, mode.lit));
+    mode.candidates.start(drawing.target.size.area());
+    mode.find_candidates.run_over_rects(parted, drawing.resources.with(Resource::work_list, mode.candidates));
   });
 }
 
 // Draws one sample for each pixel. Blending shares that the hit cache does not hold yet are computed and
 // cached.
-void LightLayer::draw_centres(const Drawing& drawing) {
+void LightPasses::draw_centres(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "light at pixel centres");
   PixelList& without_share = start_deferred(drawing);
   const Resources resources = drawing.resources.with(Resource::deferred_list, without_share);
   for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>&) {
-    mode.centre.work_through(mode.lit, resources);
+    mode.centre.run_over_list(mode.candidates, resources);
   });
-  shares_.work_through(without_share, resources);
+  shares_.run_over_list(without_share, resources);
 }
 
 // Lists the pixels beside an edge of light. Their samples will use the shares at their centres, so missing
 // shares are computed here.
-void LightLayer::list_edges(const Drawing& drawing) {
+void LightPasses::list_edges(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "where edges are");
   PixelList& without_share = start_deferred(drawing);
-  where_edges_.program().set("u_least_step", static_cast<float>(drawing.smoothing.least_step));
+  find_edges_.program().set("u_least_step", static_cast<float>(drawing.smoothing.least_step));
   const Resources resources = drawing.resources.with(Resource::deferred_list, without_share);
   for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>& parted) {
     mode.at_edges.start(drawing.target.size.area());
-    where_edges_.look_through(parted, resources.with(Resource::work_list, mode.at_edges));
+    find_edges_.run_over_rects(parted, resources.with(Resource::work_list, mode.at_edges));
   });
-  shares_.work_through(without_share, resources);
+  shares_.run_over_list(without_share, resources);
 }
 
 // Draws several samples for each pixel. Some pixels need a share of their own for each sample.
-void LightLayer::draw_edges(const Drawing& drawing) {
+void LightPasses::draw_edges(const Drawing& drawing) {
   const PassTimes::Scope scope(drawing.times, "light at edges");
   PixelList& with_many_shares = start_deferred(drawing);
   const Resources resources = drawing.resources.with(Resource::deferred_list, with_many_shares);
   for_modes(drawing.places, [&](ByMode& mode, const std::vector<cv::Rect>&) {
     mode.edges.program().set("u_samples", drawing.smoothing.samples);
-    mode.edges.work_through(mode.at_edges, resources);
+    mode.edges.run_over_list(mode.at_edges, resources);
   });
-  rest_.program().set("u_samples", drawing.smoothing.samples);
-  rest_.work_through(with_many_shares, resources);
+  edges_deferred_.program().set("u_samples", drawing.smoothing.samples);
+  edges_deferred_.run_over_list(with_many_shares, resources);
 }
 
-PixelList& LightLayer::start_deferred(const Drawing& drawing) {
+PixelList& LightPasses::start_deferred(const Drawing& drawing) {
   deferred_.start(drawing.target.size.area());
   return deferred_;
 }
 
 template <class Do>
-void LightLayer::for_modes(const PlacesByMode& places, const Do& draw_mode) {
+void LightPasses::for_modes(const PlacesByMode& places, const Do& draw_mode) {
   for (std::size_t i = 0; i < modes_.size(); ++i)
     if (modes_[i].is_used) draw_mode(modes_[i], *places.each()[i]);
 }
 
-void LightLayer::work_through_lit(const ComputePass& pass, const Resources& resources) const {
+void LightPasses::run_over_drawn_pixels(const ComputePass& pass, const Resources& resources) const {
   for (const ByMode& mode : modes_) {
     if (!mode.is_used) continue;
-    pass.work_through(mode.lit, resources);
-    pass.work_through(mode.at_edges, resources);
+    pass.run_over_list(mode.candidates, resources);
+    pass.run_over_list(mode.at_edges, resources);
   }
 }
 

@@ -1,14 +1,14 @@
 #version 450 core
 // Finds a depth edge in each of the listed blocks, and lists the blocks that have one for
-// shaders/jump_handed.comp.
+// shaders/depth_edge_handover.comp.
 #include "bindings.glsl"
-#include "jumps.glsl"
-#include "listed.glsl"
-#include "rest.glsl"
+#include "depth_edges.glsl"
+#include "work_list.glsl"
+#include "deferred_list.glsl"
 layout(local_size_x = 64) in;
 // Texels on the near side of the edge (xy) and on its far side (zw). x: -1 without an edge; z: -1 when the
 // far side is empty.
-layout(rgba32f, binding = k_depth_edges_image) uniform writeonly image2D u_jumps;
+layout(rgba32f, binding = k_depth_edges_image) uniform writeonly image2D u_depth_edges;
 
 // The two texels beside the texel `at`, the nearer one first.
 vec4 sides(ivec2 at, ivec2 step) {
@@ -20,25 +20,25 @@ vec4 sides(ivec2 at, ivec2 step) {
 }
 
 // The first edge in a block, row by row; for each texel, along the row first, then along the column.
-vec4 jump(ivec2 first) {
+vec4 depth_edge_in(ivec2 first) {
   vec4 found = vec4(-1);
   int i = 0;
   do {
     ivec2 at = first + ivec2(i % k_block, i / k_block);
     float here = nearness(at);
-    if (is_jump(nearness(at - ivec2(1, 0)), here, nearness(at + ivec2(1, 0))))
+    if (is_depth_edge(nearness(at - ivec2(1, 0)), here, nearness(at + ivec2(1, 0))))
       found = sides(at, ivec2(1, 0));
-    else if (is_jump(nearness(at - ivec2(0, 1)), here, nearness(at + ivec2(0, 1))))
+    else if (is_depth_edge(nearness(at - ivec2(0, 1)), here, nearness(at + ivec2(0, 1))))
       found = sides(at, ivec2(0, 1));
   } while (found.x < 0.0 && ++i < k_block * k_block);
   return found;
 }
 
 void main() {
-  if (!is_listed()) return;
-  ivec2 block = listed_pixel();
-  vec4 found = jump(k_block * block);
+  if (!has_work()) return;
+  ivec2 block = work_pixel();
+  vec4 found = depth_edge_in(k_block * block);
   if (found.x < 0.0) return;
-  imageStore(u_jumps, block, found);
-  leave_pixel(block);
+  imageStore(u_depth_edges, block, found);
+  defer_pixel(block);
 }

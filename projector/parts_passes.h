@@ -14,12 +14,12 @@ namespace limn::projector {
 struct Smoothing;
 
 /// Draws the parts as an imager sees them, in linear light with coverage. It works with pixel lists, as
-/// LightLayer does: it lists the pixels that may see a part, draws one sample at their centres, then several
+/// LightPasses does: it lists the pixels that may see a part, draws one sample at their centres, then several
 /// samples at edges, and then the few pixels that need an extra pass.
-class PartsLayer {
+class PartsPasses {
  public:
-  /// `looks`: the defines of the shading programs (GpuScene::looks).
-  static Result<PartsLayer> link(Defines looks);
+  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines).
+  static Result<PartsPasses> link(Defines shading_defines);
   /// Links the programs with contact shadows. Further calls do nothing.
   Status link_shadowed();
 
@@ -41,20 +41,20 @@ class PartsLayer {
             PassTimes* times);
 
  private:
-  struct Passes {
-    ComputePass where, centre, edges;
-    std::optional<ComputePass> rest;
+  struct Steps {
+    ComputePass find_candidates, centre, edges;
+    std::optional<ComputePass> edges_deferred;
   };
   struct Both {
-    Passes parts, view;
+    Steps parts, view;
     static Result<Both> link(Defines defines);
   };
-  Defines looks_;
+  Defines shading_defines_;
   Both plain_;
   std::optional<Both> shadowed_;
-  ComputePass where_edges_;
-  PixelList list_;          // first the pixels that may see something, then those at edges
-  PixelList beside_unlit_;  // pixels at edges with samples that light may not show
+  ComputePass find_edges_;
+  PixelList work_list_;      // first the pixels that may see something, then those at edges
+  PixelList deferred_list_;  // pixels at edges with samples that light may not show
 };
 
 }  // namespace limn::projector

@@ -27,16 +27,16 @@ struct Smoothing;
 
 /// Draws the light that a projector should give (shaders/light.glsl). Each pass processes a list of pixels
 /// that all need the same work. The lists take 20 bytes for each pixel, 28 where parts of both modes overlap.
-class LightLayer {
+class LightPasses {
  public:
-  /// `looks`: the defines of the shading programs (GpuScene::looks); `by_measurement`: light is compensated
-  /// by the measured surface.
-  static Result<LightLayer> link(Defines looks, bool by_measurement);
+  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines); `by_measurement`:
+  /// light is compensated by the measured surface.
+  static Result<LightPasses> link(Defines shading_defines, bool by_measurement);
 
   struct Target {
     const GlName& light;  ///< GL_RGBA32F
     cv::Size size;
-    bool is_unknown;  ///< The contents of the hit cache are outdated.
+    bool is_cache_outdated;  ///< The contents of the hit cache are outdated.
   };
   /// Draws within `places` only. `resources` must hold scene, viewpoints, occlusion, lens, room light,
   /// projector, hit cache and light balance.
@@ -46,13 +46,13 @@ class LightLayer {
             const Resources& resources,
             PassTimes* times);
   /// Runs a pass over all pixels that the last draw may have given light.
-  void work_through_lit(const ComputePass& pass, const Resources& resources) const;
+  void run_over_drawn_pixels(const ComputePass& pass, const Resources& resources) const;
 
  private:
   struct ByMode {
-    ComputePass where, centre, edges;
-    PixelList lit, at_edges;  // the pixels that may give light, and those at edges
-    bool is_used = false;     // whether the last draw had places of this mode
+    ComputePass find_candidates, centre, edges;
+    PixelList candidates, at_edges;  // the pixels that may give light, and those at edges
+    bool is_used = false;            // whether the last draw had places of this mode
   };
   // The arguments of one draw, which its phases share.
   struct Drawing {
@@ -63,7 +63,7 @@ class LightLayer {
     PassTimes* times;
   };
   void find_hits(const Drawing& drawing);
-  void list_lit(const Drawing& drawing);
+  void list_candidates(const Drawing& drawing);
   void draw_centres(const Drawing& drawing);
   void list_edges(const Drawing& drawing);
   void draw_edges(const Drawing& drawing);
@@ -71,7 +71,7 @@ class LightLayer {
   template <class Do>
   void for_modes(const PlacesByMode& places, const Do& draw_mode);
 
-  ComputePass hits_, unknown_, listed_hits_, shares_, where_edges_, rest_;
+  ComputePass hits_, cache_misses_, listed_hits_, shares_, find_edges_, edges_deferred_;
   std::array<ByMode, 3> modes_;  // in the order of PlacesByMode
   PixelList deferred_;           // used by one phase at a time, which gives it a name that says what it holds
 };

@@ -3,22 +3,22 @@
 // share computes its own.
 #include "bindings.glsl"
 #include "light.glsl"
-#include "listed.glsl"
+#include "work_list.glsl"
 #include "samples.glsl"
 layout(local_size_x = 64) in;
 layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 
 void main() {
-  if (!is_listed()) return;
-  ivec2 at = listed_pixel();
+  if (!has_work()) return;
+  ivec2 at = work_pixel();
   CentreShare centre = centre_share(at);
   vec4 sum = vec4(0);
   int k = 0;
   do {
-    Sample seen = sample_at(vec2(at) + sample_offset(k), centre);
+    Sample s = sample_at(vec2(at) + sample_offset(k), centre);
     Share share = centre.share;
-    if (!seen.is_beside) share = share_of(u_projector, seen.place);
-    if (seen.is_lit) sum += light_of(seen, share);
+    if (!s.uses_centre_share) share = share_of(u_projector, s.place);
+    if (s.gives_light) sum += light_of(s, share);
   } while (++k < u_samples);
   imageStore(u_image, at, sum / float(u_samples));
 }

@@ -8,7 +8,7 @@ uniform float u_near, u_focal;
 
 // Whether three texels in a row contain an edge. The nearness of a plane is linear in the image, a crease
 // bends it, an edge breaks it.
-bool is_jump(float a, float b, float c) {
+bool is_depth_edge(float a, float b, float c) {
   const float k_least = 0.0015;  // m
   const float k_bend = 4.0;      // texels of depth; a right-angled corner seen symmetrically has 2
   float nearest = max(b, max(a, c));
