@@ -42,7 +42,7 @@ ordered_json to_json(const PoseJudged& judged) {
   for (const calib::DeviceQuality& device : assessment.devices)
     json["coverage"][device.name] = device.coverage;
   json["faults"] = ordered_json::array();
-  for (const calib::Fault& fault : assessment.faults) json["faults"].push_back(fault.name);
+  for (const calib::Fault& fault : assessment.faults) json["faults"].push_back(calib::to_text(fault.name));
   json["more_helps"] = judged.more_helps;
   return json;
 }
@@ -72,7 +72,7 @@ std::string to_json(const Calibrated& done) {
 
 void say_end(const CalibrateOptions& options, const Calibrated& done, const Say& say) {
   for (const calib::Fault& fault : done.report.assessment.faults)
-    say(fmt::format("fault {}: {}; {}.", fault.name, fault.evidence, fault.advice));
+    say(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
   for (const std::string& sentence : done.report.explanation.advice) say("advice: " + sentence);
   std::vector<std::string> times;
   for (const auto& [projector, seconds] : done.capture_s)

@@ -36,7 +36,7 @@ void print_report(const calib::Report& report) {
                  1e3 * check.stddev_m);
   }
   for (const calib::Fault& fault : assessment.faults)
-    fmt::print("fault {}: {}; {}.\n", fault.name, fault.evidence, fault.advice);
+    fmt::print("fault {}: {}; {}.\n", calib::to_text(fault.name), fault.evidence, fault.advice);
   for (const std::string& sentence : report.explanation.advice) fmt::print("advice: {}\n", sentence);
   fmt::print("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %\n{}\n", assessment.held_out.rms_px,
              assessment.held_out.worst_px, 100 * assessment.decoded_share, report.explanation.verdict);

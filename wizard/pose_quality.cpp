@@ -11,7 +11,8 @@ constexpr double k_settled = 0.05;  // share; the error has settled if it fell b
 
 // Whether another pose may cure the fault; a person has to cure the others.
 bool wants_poses(const calib::Fault& fault) {
-  return fault.name == "few_poses" || fault.name == "little_tilt" || fault.name == "low_coverage";
+  return fault.name == calib::FaultName::few_poses || fault.name == calib::FaultName::little_tilt ||
+         fault.name == calib::FaultName::low_coverage;
 }
 
 }  // namespace
@@ -24,7 +25,7 @@ std::string more_helps(const std::vector<PoseJudged>& poses) {
   if (poses.empty() || !poses.back().assessment) return "too few poses to solve a rig";
   const calib::Assessment& last = *poses.back().assessment;
   for (const calib::Fault& fault : last.faults)
-    if (wants_poses(fault)) return fault.name;
+    if (wants_poses(fault)) return calib::to_text(fault.name);
   if (last.verdict != calib::Verdict::good) return "the rig is " + calib::to_text(last.verdict);
   const double mm = predicted_mm(last);
   if (mm <= calib::k_fine_mm) return "";

@@ -106,19 +106,20 @@ class FaultTeller {
  public:
   explicit FaultTeller(const Say& say) : say_(say) {}
   void report_progress(const std::vector<calib::Fault>& faults) {
-    std::set<std::string> names;
+    std::set<calib::FaultName> names;
     for (const calib::Fault& fault : faults) {
       const bool is_new = names.insert(fault.name).second && !told_.contains(fault.name);
-      if (is_new) say_(fmt::format("fault {}: {}; {}.", fault.name, fault.evidence, fault.advice));
+      if (is_new)
+        say_(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
     }
-    for (const std::string& name : told_)
-      if (!names.contains(name)) say_(fmt::format("fault {} is gone", name));
+    for (const calib::FaultName name : told_)
+      if (!names.contains(name)) say_(fmt::format("fault {} is gone", calib::to_text(name)));
     told_ = std::move(names);
   }
 
  private:
   const Say& say_;
-  std::set<std::string> told_;
+  std::set<calib::FaultName> told_;
 };
 
 // One run of the wizard, pose by pose.

@@ -109,7 +109,7 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
   const double allowed = std::max(k_offset_m, k_offset_share * width);
   if (bend > std::max(k_bend_m, k_bend_share * width) || offsets.out_m > allowed)
     faults.push_back(
-        {"bent_board",
+        {FaultName::bent_board,
          fmt::format(
              "the board differs from flat by {:.1f} mm over its width and height (bends of {:.1f} and {:.1f} "
              "mm); its corners differ from that shape by {:.2f} mm RMS",
@@ -119,7 +119,7 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
   const bool is_stretched = std::abs(stretch) > 0.01;
   if (is_stretched || (faults.empty() && offsets.across_m > allowed))
     faults.push_back(
-        {"wrong_square_size",
+        {FaultName::wrong_square_size,
          fmt::format("{}corners differ from their nominal positions by {:.2f} mm RMS",
                      is_stretched
                          ? fmt::format("all lenses have fy / fx = {:.3f}: squares are not as wide as "

@@ -136,7 +136,7 @@ void note_dark(const Observed& observed, const std::vector<Seen>& pairs, std::ve
     }
     if (poses == 0 || best >= k_least_lit || 2 * with_labels > poses) continue;
     faults->push_back(
-        {"wrong_display",
+        {FaultName::wrong_display,
          fmt::format(
              "the patterns of {} illuminate {:.2f} % of the image, though the board is seen in {} poses",
              observed.observations.projectors[projector].name, 100 * best, poses),
@@ -178,7 +178,7 @@ void note_same_light(const Observations& observations, std::vector<Fault>* fault
       const Agreement found = agreement(observations, a, b);
       if (found.places < k_least_samples / 10 || found.same < k_same_share * found.places) continue;
       faults->push_back(
-          {"wrong_display",
+          {FaultName::wrong_display,
            fmt::format(
                "the patterns of {} illuminate what those of {} do: {} of {} pixels have the same label",
                observations.projectors[static_cast<size_t>(b)].name,
@@ -194,7 +194,7 @@ void note_mirrored(const Seen& seen, std::vector<Fault>* faults) {
                                      [](const Matrix2d& map) { return map.determinant() < 0; });
   if (2 * static_cast<size_t>(against) <= seen.maps.size()) return;
   faults->push_back(
-      {"mirrored_projection",
+      {FaultName::mirrored_projection,
        fmt::format("the pixels of {} are mirrored against those of {} in {} of {} poses",
                    seen.projector_name(), seen.camera_name(), against, seen.maps.size()),
        "switch off rear projection (mirroring) in the projector's menu or the display's settings; likewise "
@@ -247,7 +247,7 @@ void note_between(const Seen& seen, std::vector<Fault>* faults) {
   const double darker = seen.median_of([&](const CaptureQuality& h) { return between(seen, h).darker; });
   if (off < k_between || darker < k_between_level) return;
   faults->push_back(
-      {"keystone_or_scaling",
+      {FaultName::keystone_or_scaling,
        fmt::format(
            "{}: under the finest stripes, {:.0f} % more pixels than under wide stripes differ from the "
            "sum of white and black (median {:.1f} % of it): the image is interpolated between the "
@@ -294,7 +294,7 @@ bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
   const bool white_fits = narrow ? white > 1 - k_white_under_narrow : std::abs(white - 1) < k_white_contrast;
   if (range < k_level_range && white_fits) return false;
   faults->push_back(
-      {"exposure_drift",
+      {FaultName::exposure_drift,
        fmt::format("{}: the sum of an image and its inverse changes by {:.1f} % within a series; the "
                    "contrast of white against black is {:.2f} of that of {} stripes",
                    seen.both(), 100 * range, white, narrow ? "narrow" : "wide"),
@@ -309,7 +309,7 @@ void note_motion(const Seen& seen, std::vector<Fault>* faults) {
   for (const CaptureQuality* quality : seen.series) {
     if (quality->shift_patches < 4 || quality->shift_px < limit) continue;
     faults->push_back(
-        {"moved_during_capture",
+        {FaultName::moved_during_capture,
          fmt::format("{}, {}: the image moved by {:.2f} px (parts of it by {:.2f} px) between the first "
                      "images and the last; {:.2f} px may be noise",
                      seen.pose_name(*quality), seen.both(), quality->shift_px, quality->shift_worst_px,
@@ -351,7 +351,7 @@ void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
       seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
   if (contrast >= k_sharp) return;
   faults->push_back(
-      {"defocus",
+      {FaultName::defocus,
        fmt::format(
            "{}: stripes of {} projector pixels keep {:.0f} % of their contrast; in focus they keep over "
            "{:.0f} %",
@@ -377,7 +377,7 @@ void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
   if (std::abs(level - 0.5) < k_wave_level) return;
   const double power = power_of_waves(level);
   faults->push_back(
-      {"projector_gamma",
+      {FaultName::projector_gamma,
        fmt::format(
            "{}: the waves' mean light is {:.1f} % of white's; sinusoids have 50 %. It looks as if their "
            "light was raised to the power {:.2f}",
@@ -395,7 +395,7 @@ bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
   });
   if (share < k_room_share) return false;
   faults->push_back(
-      {"ambient_light",
+      {FaultName::ambient_light,
        fmt::format("{}: {:.0f} levels under black, {:.0f} under white (medians): room light is {:.0f} % of "
                    "the light",
                    seen.both(), seen.median_of([](const CaptureQuality& h) { return h.black_level; }),
@@ -409,7 +409,7 @@ bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
   const double share = seen.median_of([](const CaptureQuality& h) { return h.saturated; });
   if (share < k_saturated_share) return false;
   faults->push_back(
-      {"saturated",
+      {FaultName::saturated,
        fmt::format("{}: white saturates {:.0f} % of the illuminated pixels", seen.both(), 100 * share),
        "shorten the exposure or close the aperture until white is just below saturation"});
   return true;
@@ -420,7 +420,7 @@ void note_odd_images(const Seen& seen, std::vector<Fault>* faults) {
     if (quality->odd.empty()) continue;
     const OddImage& odd = quality->odd.front();
     faults->push_back(
-        {"repeated_pictures",
+        {FaultName::repeated_pictures,
          fmt::format("{}, {}: {} {}{}", seen.pose_name(*quality), seen.both(), odd.file.filename().string(),
                      odd.finding,
                      quality->odd.size() > 1 ? fmt::format(" (and {} more)", quality->odd.size() - 1) : ""),
@@ -459,7 +459,7 @@ void note_camera_shapes(const Observations& observations, std::vector<Fault>* fa
     const auto aspect = camera_aspect(observations, camera);
     if (!aspect || std::abs(*aspect - 1) < k_rough_aspect) continue;
     faults->push_back(
-        {"wrong_camera_resolution",
+        {FaultName::wrong_camera_resolution,
          fmt::format("{}: its pixels are about {:.2f} times as wide as high",
                      observations.cameras[static_cast<size_t>(camera)].name, *aspect),
          "use a resolution with the sensor's own shape, without stretching, digital zoom or cropping"});

@@ -46,11 +46,11 @@ void note_board(const Observations& observations, const Solution& solution, std:
                                   [&](const CornerObservation& corner) { return corner.pose == pose; });
     if (!seen)
       faults->push_back(
-          {"board_not_visible",
+          {FaultName::board_not_visible,
            fmt::format("no camera sees the board in {}", observations.poses[static_cast<size_t>(pose)]),
            "a scene capture is fine; otherwise light the board and keep it in view", Severity::note});
     if (seen && !solution.world_from_board[static_cast<size_t>(pose)])
-      faults->push_back({"board_not_placed",
+      faults->push_back({FaultName::board_not_placed,
                          fmt::format("too few corners, or all on a line, in {}; the pose is not used",
                                      observations.poses[static_cast<size_t>(pose)]),
                          "keep more of the board in view and lit", Severity::note});
@@ -71,11 +71,11 @@ void note_geometry(const Observations& observations, const Solution& solution, s
     }
   }
   if (poses < k_few_poses)
-    faults->push_back({"few_poses",
+    faults->push_back({FaultName::few_poses,
                        fmt::format("{} of {} poses show the board", poses, observations.poses.size()),
                        "capture at least 8, tilted to different sides, at the working distance"});
   if (largest < k_little_tilt_deg)
-    faults->push_back({"little_tilt",
+    faults->push_back({FaultName::little_tilt,
                        fmt::format("the boards' planes differ by at most {:.1f} degrees", largest),
                        "tilt the board by 20 to 45 degrees to different sides"});
 }
@@ -88,7 +88,7 @@ void note_images(const Observed& observed,
     const double part = share.lit > 0 ? static_cast<double>(share.decoded) / share.lit : 0;
     if (part < k_low_share)
       faults->push_back(
-          {"low_decode",
+          {FaultName::low_decode,
            fmt::format("{} of {} in {}: {:.0f} % of {} illuminated pixels decoded",
                        observations.cameras[static_cast<size_t>(share.camera)].name,
                        observations.projectors[static_cast<size_t>(share.projector)].name,
@@ -98,7 +98,7 @@ void note_images(const Observed& observed,
   for (const DeviceQuality& device : devices) {
     if (device.coverage < k_low_coverage)
       faults->push_back(
-          {"low_coverage",
+          {FaultName::low_coverage,
            fmt::format("{}: observations in {:.0f} % of the image", device.name, 100 * device.coverage),
            "add poses with the board in the corners of the image", Severity::note});
   }
@@ -125,7 +125,7 @@ void note_overlap(const Observations& observations,
     const double lit = lit_share(observations, static_cast<int>(i - observations.cameras.size()));
     if (lit > k_overlap || devices[i].coverage > k_panel_used) continue;
     faults->push_back(
-        {"little_overlap",
+        {FaultName::little_overlap,
          fmt::format(
              "{} illuminates {:.0f} % of the boards' area that cameras see, with {:.0f} % of its pixels",
              devices[i].name, 100 * lit, 100 * devices[i].coverage),
@@ -141,7 +141,7 @@ void note_odd_poses(const CrossValidation& score, std::vector<Fault>* faults) {
     }
     if (others.size() < 3 || pose.rms_px < k_odd_pose * median(others) || pose.rms_px < k_good_px) continue;
     faults->push_back(
-        {"odd_pose",
+        {FaultName::odd_pose,
          fmt::format("{}: held-out error {:.2f} px, median of the other poses {:.2f} px", pose.pose,
                      pose.rms_px, median(others)),
          "the board or a device may have moved while it was captured; try --skip-poses " + pose.pose});
@@ -153,7 +153,7 @@ double aspect(const Imager& imager) { return imager.lens.fy() / imager.lens.fx()
 void note_lenses(const Solution& solution, std::vector<Fault>* faults) {
   for (const Imager& projector : solution.rig.projectors) {
     if (std::abs(aspect(projector)) < k_aspect) continue;
-    faults->push_back({"keystone_or_scaling",
+    faults->push_back({FaultName::keystone_or_scaling,
                        fmt::format("{}: its pixels are {:.3f} times as wide as high", projector.name,
                                    1 + aspect(projector)),
                        "send the projector its native resolution; switch off keystone, zoom and aspect "
@@ -165,7 +165,7 @@ void note_lenses(const Solution& solution, std::vector<Fault>* faults) {
                        camera.width;
     if (std::abs(aspect(camera)) < k_aspect && off < k_camera_centre) continue;
     faults->push_back(
-        {"wrong_camera_resolution",
+        {FaultName::wrong_camera_resolution,
          fmt::format("{}: its pixels are {:.3f} times as wide as high, its optical axis is {:.0f} % of the "
                      "width from the middle",
                      camera.name, 1 + aspect(camera), 100 * off),
@@ -183,7 +183,7 @@ void note_turned(const Solution& solution, std::vector<Fault>* faults) {
     const double shift = (projector.lens.cy() - (projector.height - 1) / 2.0) / projector.height;
     if (turned < k_turned_deg || shift > k_shifted) continue;
     faults->push_back(
-        {"rotated_projection",
+        {FaultName::rotated_projection,
          fmt::format("{}: its image is turned by {:.0f} degrees against {}; its lens shift ({:.2f} image "
                      "heights) is not that of a ceiling-mounted projector",
                      projector.name, turned, camera.name, shift),
@@ -193,16 +193,18 @@ void note_turned(const Solution& solution, std::vector<Fault>* faults) {
 
 // Removes faults that follow from others.
 void erase_implied(std::vector<Fault>* faults) {
-  const auto has = [&](const char* name) {
+  const auto has = [&](FaultName name) {
     return std::any_of(faults->begin(), faults->end(), [&](const Fault& f) { return f.name == name; });
   };
   // Where the board is stretched, or a projector's pixels are distorted to fit, the other lenses follow; a
   // camera whose pixels are not square makes the board look bent.
-  const bool board = has("wrong_square_size"), panel = has("keystone_or_scaling");
-  const bool image = !board && !panel && has("wrong_camera_resolution");
+  const bool board = has(FaultName::wrong_square_size), panel = has(FaultName::keystone_or_scaling);
+  const bool image = !board && !panel && has(FaultName::wrong_camera_resolution);
   std::erase_if(*faults, [&](const Fault& fault) {
-    return (board && (fault.name == "wrong_camera_resolution" || fault.name == "keystone_or_scaling")) ||
-           (panel && fault.name == "wrong_camera_resolution") || (image && fault.name == "bent_board");
+    return (board && (fault.name == FaultName::wrong_camera_resolution ||
+                      fault.name == FaultName::keystone_or_scaling)) ||
+           (panel && fault.name == FaultName::wrong_camera_resolution) ||
+           (image && fault.name == FaultName::bent_board);
   });
 }
 
@@ -242,7 +244,7 @@ void note_swapped(const std::vector<Stand>& before,
   }
   if (swaps.empty()) return;
   faults->push_back(
-      {"projectors_swapped", fmt::format("{}", fmt::join(swaps, ", ")),
+      {FaultName::projectors_swapped, fmt::format("{}", fmt::join(swaps, ", ")),
        "connect each projector to its own display again (cables, display order); if the projectors "
        "have really changed places, run limn solve once more",
        Severity::reject});
@@ -255,7 +257,7 @@ void note_other_images(const Rig& earlier, const Rig& now, std::vector<Fault>* f
     const double zoom = camera.lens.fx() / camera.width / (before->lens.fx() / before->width);
     if (std::abs(zoom - 1) < k_zoom) continue;
     faults->push_back(
-        {"wrong_camera_resolution",
+        {FaultName::wrong_camera_resolution,
          fmt::format(
              "{}: its image ({}x{}) has {:.3f} times the field of view of the earlier calibration ({}x{})",
              camera.name, camera.width, camera.height, 1 / zoom, before->width, before->height),
@@ -309,7 +311,7 @@ std::vector<Fault> faults_against(const Rig& earlier, const Rig& now) {
   note_other_images(earlier, now, &found);
   const double scale = common_scale(before, after);
   if (std::abs(scale - 1) > k_scale)
-    found.push_back({"wrong_square_size",
+    found.push_back({FaultName::wrong_square_size,
                      fmt::format("every distance is {:.4f} times that of the earlier calibration, while all "
                                  "directions and lenses are the same",
                                  scale),
@@ -328,7 +330,8 @@ Severity heaviest(const std::vector<Fault>& faults) {
 std::string to_text(const std::vector<Fault>& faults) {
   std::string text;
   for (const Fault& fault : faults)
-    text += fmt::format("{}{}: {}; {}.", text.empty() ? "" : "\n", fault.name, fault.evidence, fault.advice);
+    text += fmt::format("{}{}: {}; {}.", text.empty() ? "" : "\n", to_text(fault.name), fault.evidence,
+                        fault.advice);
   return text;
 }
 

@@ -5,12 +5,69 @@
 
 #include "calib/observations.h"
 #include "calib/solve.h"
+#include "core/enum_names.h"
 #include "core/rig.h"
 
 namespace limn::calib {
 
 struct DeviceQuality;
 struct CrossValidation;
+
+/// The faults that captures can have. The function that finds a fault says what it means.
+enum class FaultName {
+  board_not_visible,
+  board_not_placed,
+  few_poses,
+  little_tilt,
+  low_decode,
+  low_coverage,
+  little_overlap,
+  odd_pose,
+  keystone_or_scaling,
+  wrong_camera_resolution,
+  rotated_projection,
+  bent_board,
+  wrong_square_size,
+  projectors_swapped,
+  wrong_display,
+  mirrored_projection,
+  exposure_drift,
+  projector_gamma,
+  moved_during_capture,
+  defocus,
+  ambient_light,
+  saturated,
+  repeated_pictures,
+  known_length_not_seen,
+  wrong_scale
+};
+/// The names in reports, which programs read; they never change.
+inline constexpr EnumNames<FaultName, 25> k_fault_names{{"board_not_visible",
+                                                         "board_not_placed",
+                                                         "few_poses",
+                                                         "little_tilt",
+                                                         "low_decode",
+                                                         "low_coverage",
+                                                         "little_overlap",
+                                                         "odd_pose",
+                                                         "keystone_or_scaling",
+                                                         "wrong_camera_resolution",
+                                                         "rotated_projection",
+                                                         "bent_board",
+                                                         "wrong_square_size",
+                                                         "projectors_swapped",
+                                                         "wrong_display",
+                                                         "mirrored_projection",
+                                                         "exposure_drift",
+                                                         "projector_gamma",
+                                                         "moved_during_capture",
+                                                         "defocus",
+                                                         "ambient_light",
+                                                         "saturated",
+                                                         "repeated_pictures",
+                                                         "known_length_not_seen",
+                                                         "wrong_scale"}};
+inline std::string to_text(FaultName name) { return k_fault_names.text(name); }
 
 /// Effect of a fault on the verdict.
 enum class Severity {
@@ -21,7 +78,7 @@ enum class Severity {
 
 /// Something wrong with a capture that a person can put right.
 struct Fault {
-  std::string name;      ///< stable, for programs: board_not_visible, little_tilt, …
+  FaultName name;
   std::string evidence;  ///< with numbers
   std::string advice;
   Severity severity = Severity::doubt;

@@ -308,14 +308,14 @@ std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board)
   const ScaleBar& known = check.known;
   const std::string name = fmt::format("{} to {}", known.from, known.to);
   if (check.views.empty())
-    return Fault{"known_length_not_seen",
+    return Fault{FaultName::known_length_not_seen,
                  fmt::format("in no pose are both ends of {} seen by a camera and lit by a projector", name),
                  "place the bar where a camera sees both markers and a projector lights them",
                  Severity::note};
   const double difference = check.measured_m - known.length_m, share = difference / known.length_m;
   if (std::abs(difference) <= 3 * check.stddev_m || std::abs(share) <= k_scale_tolerance) return std::nullopt;
   return Fault{
-      "wrong_scale",
+      FaultName::wrong_scale,
       fmt::format("{} is {:.2f} mm long, but {:.2f} mm (standard deviation {:.2f} mm) were measured in {} "
                   "views ({:+.2f} %)",
                   name, 1e3 * known.length_m, 1e3 * check.measured_m, 1e3 * check.stddev_m,

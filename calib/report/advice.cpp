@@ -244,8 +244,9 @@ std::string reason(const Assessment& assessment, double mm) {
     reasons.push_back(fmt::format("the predicted error is above {} mm, the limit of {}", mm_limit, better));
   std::vector<std::string> names;
   for (const Fault& fault : assessment.faults) {
-    const bool is_named = std::find(names.begin(), names.end(), fault.name) != names.end();
-    if (fault.severity != Severity::note && !is_named) names.push_back(fault.name);
+    const std::string name = to_text(fault.name);
+    const bool is_named = std::find(names.begin(), names.end(), name) != names.end();
+    if (fault.severity != Severity::note && !is_named) names.push_back(name);
   }
   if (!names.empty()) reasons.push_back("faults were found: " + joined(names));
   const double shown =

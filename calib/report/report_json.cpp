@@ -143,7 +143,7 @@ std::string report_json(const Report& report) {
   const Assessment& a = report.assessment;
   Json faults = Json::array(), seconds = Json::object();
   for (const Fault& fault : a.faults)
-    faults.push_back({{"name", fault.name}, {"evidence", fault.evidence}, {"advice", fault.advice}});
+    faults.push_back({{"name", to_text(fault.name)}, {"evidence", fault.evidence}, {"advice", fault.advice}});
   for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
   const auto since_last =
       report.history.rig ? device_moves(*report.history.rig, report.observed.observations, report.solution)

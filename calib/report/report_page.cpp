@@ -68,7 +68,7 @@ std::string fault_list(const std::vector<Fault>& faults) {
   if (faults.empty()) return "";
   std::string html = "<ul class='faults'>\n";
   for (const Fault& fault : faults)
-    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", escaped(fault.name),
+    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", to_text(fault.name),
                         escaped(fault.evidence), escaped(fault.advice));
   return html + "</ul>\n";
 }

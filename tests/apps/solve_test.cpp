@@ -394,8 +394,9 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   EXPECT_NEAR(check.measured_m, 0.250, 0.0015);
   EXPECT_LT(std::abs(check.measured_m - 0.250), 3.5 * check.stddev_m);
   EXPECT_LT(check.stddev_m, 0.0015);
-  EXPECT_TRUE(std::none_of(right->assessment.faults.begin(), right->assessment.faults.end(),
-                           [](const calib::Fault& fault) { return fault.name == "wrong_scale"; }));
+  EXPECT_TRUE(
+      std::none_of(right->assessment.faults.begin(), right->assessment.faults.end(),
+                   [](const calib::Fault& fault) { return fault.name == calib::FaultName::wrong_scale; }));
 
   std::string described = read_file(captures / "capture.json").value();
   described.replace(described.find("charuco:8x6:40mm\""), 17,
@@ -406,8 +407,9 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   ASSERT_TRUE(wrong.ok()) << wrong.message();
   ASSERT_EQ(wrong->scale_bar_lengths.size(), 1U);
   EXPECT_NEAR(wrong->scale_bar_lengths[0].measured_m, 0.250 * 39 / 40, 0.0015);
-  const auto fault = std::find_if(wrong->assessment.faults.begin(), wrong->assessment.faults.end(),
-                                  [](const calib::Fault& f) { return f.name == "wrong_scale"; });
+  const auto fault =
+      std::find_if(wrong->assessment.faults.begin(), wrong->assessment.faults.end(),
+                   [](const calib::Fault& f) { return f.name == calib::FaultName::wrong_scale; });
   ASSERT_NE(fault, wrong->assessment.faults.end());
   EXPECT_NE(fault->advice.find("instead of 39 mm"), std::string::npos) << fault->advice;
   EXPECT_NE(wrong->assessment.verdict, calib::Verdict::good);
@@ -415,7 +417,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
   const auto unseen = solved(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
-  EXPECT_EQ(unseen->assessment.faults.back().name, "known_length_not_seen");
+  EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::known_length_not_seen);
   for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
     EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
 }

@@ -347,7 +347,8 @@ Status run_case(const Case& test_case, const fs::path& folder) {
       observed.observations.corners.size(), solution.corner_noise_px, observed.observations.matches.size(),
       solution.match_noise_px, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(),
       assessment.held_out.rms_px, calib::to_text(assessment.verdict));
-  for (const calib::Fault& fault : assessment.faults) fmt::print("  {}: {}\n", fault.name, fault.evidence);
+  for (const calib::Fault& fault : assessment.faults)
+    fmt::print("  {}: {}\n", calib::to_text(fault.name), fault.evidence);
   const double limn_seconds = seconds() - begun_solving;
   const std::vector<View> views = opencv_views(captures);
   print_limn_offsets(truth, observed.observations);

@@ -53,8 +53,9 @@ Told told_of(const CaptureSet& captures, const std::string& injected, const Rig*
   }
   std::string names;
   for (const Fault& fault : told.faults) {
-    if (told.names.insert(fault.name).second) names += " " + fault.name;
-    EXPECT_FALSE(fault.evidence.empty() || fault.advice.empty()) << fault.name;
+    const std::string name = to_text(fault.name);
+    if (told.names.insert(name).second) names += " " + name;
+    EXPECT_FALSE(fault.evidence.empty() || fault.advice.empty()) << name;
   }
   printf("[ injected ] %-34s ->%s; %s\n", injected.c_str(), names.empty() ? " nothing" : names.c_str(),
          told.verdict.c_str());

@@ -289,7 +289,7 @@ TEST(Assess, NoticesABoardThatMovedWhileItWasCaptured) {
   EXPECT_NE(assessment->verdict, Verdict::good);
   bool named = false;
   for (const Fault& fault : assessment->faults)
-    named = named || (fault.name == "odd_pose" && fault.evidence.find("pose3") != std::string::npos);
+    named = named || (fault.name == FaultName::odd_pose && fault.evidence.find("pose3") != std::string::npos);
   EXPECT_TRUE(named);
 }
 
@@ -304,7 +304,7 @@ TEST(Assess, LeavesOutABoardWhoseCornersAreOnALine) {
   ASSERT_TRUE(assessment.ok()) << assessment.message();
   EXPECT_EQ(assessment->held_out.poses.size(), 5U);
   ASSERT_FALSE(assessment->faults.empty());
-  EXPECT_EQ(assessment->faults[0].name, "board_not_placed");
+  EXPECT_EQ(assessment->faults[0].name, FaultName::board_not_placed);
   EXPECT_EQ(assessment->verdict, Verdict::good);
 }
 
@@ -317,7 +317,7 @@ TEST(Assess, NoticesPosesWithoutABoard) {
   const auto assessment = assess({world.observations, {}, {}, 0, 0}, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
   ASSERT_FALSE(assessment->faults.empty());
-  EXPECT_EQ(assessment->faults[0].name, "board_not_visible");
+  EXPECT_EQ(assessment->faults[0].name, FaultName::board_not_visible);
   EXPECT_NE(assessment->faults[0].evidence.find("pose2"), std::string::npos);
 }
 
