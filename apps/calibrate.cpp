@@ -217,9 +217,6 @@ Status run_calibrate(const CalibrateOptions& options) {
     return usage_error(
         "calibrate: expected either --plan (a virtual rig) or --devices with --board, found {}.",
         options.plan.empty() ? "neither" : "both");
-  const std::vector<std::string>& codes = calib::pattern_codes();
-  if (std::find(codes.begin(), codes.end(), options.code) == codes.end())
-    return usage_error("--code: expected {}, found '{}'.", fmt::join(codes, ", "), options.code);
   return options.devices.empty() ? calibrate_virtually(options) : calibrate_devices(options);
 }
 

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "calib/code/patterns.h"
 #include "core/result.h"
 #include "device/desktop.h"
 #include "wizard/capture/device_backend.h"
@@ -10,11 +11,11 @@
 namespace limn::apps {
 
 struct CalibrateOptions {
-  std::filesystem::path plan = {};     ///< Plan of a virtual rig (limn.plan/1).
-  std::filesystem::path devices = {};  ///< limn.devices/1, instead of a plan.
-  std::string board = {};              ///< With devices: `charuco:11x8:25mm`.
-  std::string code = "gray";           ///< With devices: gray, phase or xor.
-  std::filesystem::path out;           ///< Rig folder; its captures/ keeps every image.
+  std::filesystem::path plan = {};                     ///< Plan of a virtual rig (limn.plan/1).
+  std::filesystem::path devices = {};                  ///< limn.devices/1, instead of a plan.
+  std::string board = {};                              ///< With devices: `charuco:11x8:25mm`.
+  calib::PatternCode code = calib::PatternCode::gray;  ///< With devices.
+  std::filesystem::path out;                           ///< Rig folder; its captures/ keeps every image.
   std::filesystem::path scene =
       {};             ///< Scene with the prototype's CAD mesh; with a plan the default is its world's scene.
   bool scan = false;  ///< Scan the prototype at the end and project colours that show how far light is off.

@@ -28,6 +28,7 @@
 #include "apps/scan.h"
 #include "apps/simulate.h"
 #include "apps/solve.h"
+#include "core/enum_names.h"
 #include "core/log.h"
 #include "core/version.h"
 
@@ -41,6 +42,19 @@ int finished(const Status& status) {
   if (status) return 0;
   log_warning("limn: {}", status.message());
   return status.error().wrong_usage ? 2 : 1;
+}
+
+// An option whose value is one of an enum's names. The help shows the present value as the default.
+template <class Enum, std::size_t Count>
+CLI::Option* add_choice(CLI::App* command,
+                        const std::string& name,
+                        Enum* value,
+                        const EnumNames<Enum, Count>& names,
+                        const std::string& help) {
+  const auto keep = [value, &names](const std::string& text) { *value = names.find(text).value(); };
+  return command->add_option_function<std::string>(name, keep, help)
+      ->check(CLI::IsMember(names.all()))
+      ->default_str(names.text(*value));
 }
 
 void add_demo(CLI::App& app, Run& run) {
@@ -204,9 +218,8 @@ void add_patterns(CLI::App& app, Run& run) {
   auto options = std::make_shared<PatternsOptions>();
   command->add_option("--projector", options->projector, "Size of the projector in pixels, such as 1280x800")
       ->required();
-  command
-      ->add_option("--code", options->code, "Code: gray, phase (most accurate) or xor (for concave surfaces)")
-      ->capture_default_str();
+  add_choice(command, "--code", &options->code, calib::k_pattern_codes,
+             "Code: gray, phase (most accurate) or xor (for concave surfaces)");
   auto& code = options->code_options;
   command->add_option("--period", code.period_px, "With phase: length of a wave in projector pixels")
       ->capture_default_str();
@@ -295,9 +308,9 @@ void add_calibrate(CLI::App& app, Run& run) {
       ->add_option("--board", options->board,
                    "With --devices: the board, written as for limn markers --board")
       ->needs(devices);
-  command->add_option("--code", options->code, "With --devices: code of the patterns, gray, phase or xor")
-      ->needs(devices)
-      ->capture_default_str();
+  add_choice(command, "--code", &options->code, calib::k_pattern_codes,
+             "With --devices: code of the patterns, gray, phase or xor")
+      ->needs(devices);
   command
       ->add_option(
           "--scene", options->scene,

@@ -35,9 +35,9 @@ Status write_response(const PatternsOptions& options, const PixelSize& size) {
 // The patterns corrected by the response that the options name.
 Result<calib::Patterns> by_response(const PatternsOptions& options, const calib::Patterns& patterns) {
   if (options.linearise.empty()) return patterns;
-  if (options.code != "phase")
+  if (options.code != calib::PatternCode::phase)
     return usage_error("--linearise: expected --code phase, found {}, which shows only black and white.",
-                       options.code);
+                       calib::to_text(options.code));
   LIMN_TRY(const RigResponses responses, load_responses(options.linearise));
   if (options.name.empty() && responses.projectors.size() != 1)
     return usage_error("--linearise {}: expected one projector in it, found {}. Choose one with --name.",

@@ -10,7 +10,7 @@ namespace limn::apps {
 
 struct PatternsOptions {
   std::string projector;  ///< Size in pixels, "1280x800".
-  std::string code = "gray";
+  calib::PatternCode code = calib::PatternCode::gray;
   calib::CodeOptions code_options = calib::CodeOptions();
   std::filesystem::path linearise = {};  ///< With phase: response.json that the waves are corrected by.
   std::string name = {};                 ///< Projector in that file; may be empty if it holds only one.

@@ -58,7 +58,7 @@ Status captured_by_devices(const RecheckCommand& command, const fs::path& folder
   LIMN_TRY(const calib::Board board, calibration_board(rig));
   const calib::CaptureSet captures =
       calib::plan_captures(folder, captured_devices(devices.cameras), captured_devices(devices.projectors),
-                           board, "gray", {.inverses = false});
+                           board, calib::PatternCode::gray, {.inverses = false});
   DeviceBackend stage(std::move(devices), board, nullptr);
   ImageWriter writer;
   return captured_once(captures, rig, stage.surroundings(&writer));

@@ -164,7 +164,7 @@ CaptureSet plan_captures(const fs::path& folder,
                          std::vector<CapturedDevice> cameras,
                          std::vector<CapturedDevice> projectors,
                          const Board& board,
-                         const std::string& code,
+                         PatternCode code,
                          const CodeOptions& options) {
   CaptureSet plan{folder, std::move(cameras), std::move(projectors), {}, board, {}};
   for (const CapturedDevice& projector : plan.projectors)
@@ -207,7 +207,7 @@ Result<CaptureSet> import_opencv_gray(const ForeignCaptureSet& foreign) {
   if (!fs::is_directory(foreign.folder))
     return error("{}: expected a folder of captures, found none.", foreign.folder.string());
   LIMN_TRY(const Patterns patterns,
-           Patterns::create("gray", foreign.projector_width, foreign.projector_height));
+           Patterns::create(PatternCode::gray, foreign.projector_width, foreign.projector_height));
   CaptureSet captures{foreign.folder, {{"camera0", 0, 0}}, {{"projector0", patterns.width, patterns.height}},
                       {patterns},     foreign.board,       {}};
   LIMN_TRY(const auto names, pose_names(foreign.folder, foreign.poses, foreign.skip));

@@ -36,13 +36,13 @@ struct CaptureSet {
   std::vector<std::string> scale_bar_lengths = {};
 };
 
-/// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet. An
-/// unknown code, or options out of their range, throw: the caller must have checked what people entered.
+/// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet.
+/// Options out of their range throw: the caller must have checked what people entered.
 CaptureSet plan_captures(const std::filesystem::path& folder,
                          std::vector<CapturedDevice> cameras,
                          std::vector<CapturedDevice> projectors,
                          const Board& board,
-                         const std::string& code = "gray",
+                         PatternCode code = PatternCode::gray,
                          const CodeOptions& options = {});
 
 /// The file of one image: pose00/camera0/000.png, or pose00/projector0/camera0/000.png where there are

@@ -531,7 +531,8 @@ Result<Decoded> decode(const Patterns& patterns,
   decoded.quality = series.probe.quality(images);
   const DifferenceNoise noise =
       difference_noise(white, black, patterns.options.inverses, decoded.quality.noise);
-  const LeastSteps steps = least_steps(series.direct, patterns.code == "xor", noise, options, &decoded);
+  const LeastSteps steps =
+      least_steps(series.direct, patterns.code == PatternCode::exclusive_or, noise, options, &decoded);
   std::vector<AxisLabels> labels;
   cv::Mat doubted(height, width, CV_8U, cv::Scalar(0));
   for (size_t axis = 0; axis < 2; ++axis) {

@@ -75,29 +75,29 @@ bool rises(const std::vector<double>& curve) {
   return curve.size() >= 2 && std::is_sorted(curve.begin(), curve.end()) && curve.back() > curve.front();
 }
 
-Status check(const std::string& code, const CodeOptions& options) {
+Status check(PatternCode code, const CodeOptions& options) {
   const auto within = [](double value, double low, double high) { return value >= low && value <= high; };
-  if (code == "phase" && !within(options.period_px, k_min_period_px, k_max_period_px))
+  if (code == PatternCode::phase && !within(options.period_px, k_min_period_px, k_max_period_px))
     return error("expected waves of {} to {} whole pixels, found {}.", k_min_period_px, k_max_period_px,
                  options.period_px);
-  if (code == "phase" && !within(options.steps, k_min_steps, k_max_steps))
+  if (code == PatternCode::phase && !within(options.steps, k_min_steps, k_max_steps))
     return error("expected {} to {} steps of a wave, found {}.", k_min_steps, k_max_steps, options.steps);
-  if (code == "phase" && !within(options.gamma, k_min_gamma, k_max_gamma))
+  if (code == PatternCode::phase && !within(options.gamma, k_min_gamma, k_max_gamma))
     return error("expected a gamma of {} to {}, found {}.", k_min_gamma, k_max_gamma, options.gamma);
-  if (code == "phase" && options.response &&
+  if (code == PatternCode::phase && options.response &&
       !(rises(options.response->red) && rises(options.response->green) && rises(options.response->blue)))
     return error(
         "response: expected curves of at least 2 numbers that never fall and end above their start.");
-  if (code == "xor" && options.base_stripe_px != 2 && options.base_stripe_px != 4 &&
+  if (code == PatternCode::exclusive_or && options.base_stripe_px != 2 && options.base_stripe_px != 4 &&
       options.base_stripe_px != 8)
     return error("expected stripes of 2, 4 or 8 pixels, found {}.", options.base_stripe_px);
   return {};
 }
 
 // Options that a code does not use keep their defaults, so that equal images mean equal structs.
-CodeOptions used(const std::string& code, const CodeOptions& options) {
+CodeOptions used(PatternCode code, const CodeOptions& options) {
   CodeOptions kept;
-  if (code == "phase") {
+  if (code == PatternCode::phase) {
     kept.period_px = options.period_px;
     kept.steps = options.steps;
     if (options.response)
@@ -105,22 +105,14 @@ CodeOptions used(const std::string& code, const CodeOptions& options) {
     else
       kept.gamma = options.gamma;
   }
-  if (code == "xor") kept.base_stripe_px = options.base_stripe_px;
-  if (code != "phase") kept.inverses = options.inverses;
+  if (code == PatternCode::exclusive_or) kept.base_stripe_px = options.base_stripe_px;
+  if (code != PatternCode::phase) kept.inverses = options.inverses;
   return kept;
 }
 
 }  // namespace
 
-std::vector<std::string> pattern_codes() { return {"gray", "phase", "xor"}; }
-
-Result<Patterns> Patterns::create(const std::string& code,
-                                  int width,
-                                  int height,
-                                  const CodeOptions& options) {
-  const auto codes = pattern_codes();
-  if (std::find(codes.begin(), codes.end(), code) == codes.end())
-    return error("pattern code '{}' is unknown. The codes are: {}.", code, joined_names(codes));
+Result<Patterns> Patterns::create(PatternCode code, int width, int height, const CodeOptions& options) {
   if (width < 2 || height < 2 || width > k_max_side || height > k_max_side)
     return error("expected a projector of 2 to {} pixels a side, found {}x{}.", k_max_side, width, height);
   LIMN_TRY_STATUS(check(code, options));
@@ -128,7 +120,7 @@ Result<Patterns> Patterns::create(const std::string& code,
 }
 
 int Patterns::lowest_bit() const {
-  if (code != "phase") return 0;
+  if (code != PatternCode::phase) return 0;
   // Labels of at most half a wave: their centres identify the wave with a margin of a quarter.
   const int half = std::bit_width(static_cast<unsigned>(options.period_px / 2)) - 1;
   return std::min(half, bits_for(std::min(width, height)) - 1);
@@ -138,12 +130,13 @@ int Patterns::column_bits() const { return bits_for(width) - lowest_bit(); }
 int Patterns::row_bits() const { return bits_for(height) - lowest_bit(); }
 
 int Patterns::base_bit() const {
-  if (code != "xor") return 32;
+  if (code != PatternCode::exclusive_or) return 32;
   return std::bit_width(static_cast<unsigned>(options.base_stripe_px)) - 2;
 }
 
 int Patterns::widest_stripe_px() const {
-  return code == "xor" ? options.base_stripe_px : 1 << (bits_for(std::max(width, height)) - 1);
+  return code == PatternCode::exclusive_or ? options.base_stripe_px
+                                           : 1 << (bits_for(std::max(width, height)) - 1);
 }
 
 std::vector<PatternGroup> Patterns::groups() const {
@@ -175,7 +168,7 @@ cv::Mat Patterns::image(int index) const {
 Result<Patterns> linearised(const Patterns& patterns,
                             const std::vector<ProjectorResponse>& responses,
                             const std::string& projector) {
-  if (patterns.code != "phase") return patterns;
+  if (patterns.code != PatternCode::phase) return patterns;
   std::vector<std::string> names;
   for (const ProjectorResponse& response : responses) {
     names.push_back(response.projector);
@@ -192,10 +185,10 @@ std::string image_name(int index) { return fmt::format("{:03d}.png", index); }
 
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path) {
   nlohmann::ordered_json json = {{"schema", "limn.patterns/1"},
-                                 {"code", patterns.code},
+                                 {"code", to_text(patterns.code)},
                                  {"size", {patterns.width, patterns.height}},
                                  {"pictures", patterns.count()}};
-  if (patterns.code == "phase") {
+  if (patterns.code == PatternCode::phase) {
     json["period_px"] = patterns.options.period_px;
     json["steps"] = patterns.options.steps;
     if (const auto& curves = patterns.options.response)
@@ -203,7 +196,7 @@ Status save_patterns(const Patterns& patterns, const std::filesystem::path& path
     else
       json["gamma"] = patterns.options.gamma;
   }
-  if (patterns.code == "xor") json["base_stripe_px"] = patterns.options.base_stripe_px;
+  if (patterns.code == PatternCode::exclusive_or) json["base_stripe_px"] = patterns.options.base_stripe_px;
   if (!patterns.options.inverses) json["inverses"] = false;
   return write_file(path, json.dump(2) + "\n");
 }
@@ -218,16 +211,16 @@ CodeOptions read_code_options(const ConfigNode& node) {
   return options;
 }
 
-std::set<std::string> code_option_keys(const std::string& code) {
-  if (code == "phase") return {"period_px", "steps", "gamma", "response"};
-  if (code == "xor") return {"base_stripe_px", "inverses"};
+std::set<std::string> code_option_keys(PatternCode code) {
+  if (code == PatternCode::phase) return {"period_px", "steps", "gamma", "response"};
+  if (code == PatternCode::exclusive_or) return {"base_stripe_px", "inverses"};
   return {"inverses"};
 }
 
 Result<Patterns> load_patterns(const std::filesystem::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.patterns/1"));
   const ConfigNode root = config.root();
-  const std::string code = root.at("code").choice(pattern_codes());
+  const PatternCode code = k_pattern_codes.read(root.at("code"));
   std::set<std::string> keys = code_option_keys(code);
   keys.merge(std::set<std::string>{"schema", "code", "size", "pictures"});
   root.only(keys);
@@ -244,7 +237,7 @@ Result<Patterns> load_patterns(const std::filesystem::path& path) {
   if (!patterns) return error("{}: {}", path.string(), patterns.message());
   if (images != patterns->count())
     return error("{}: pictures: expected {} for {}x{} {} code, found {}.", path.string(), patterns->count(),
-                 patterns->width, patterns->height, code, images);
+                 patterns->width, patterns->height, to_text(code), images);
   return patterns;
 }
 

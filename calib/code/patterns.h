@@ -8,10 +8,16 @@
 #include <vector>
 
 #include "core/config.h"
+#include "core/enum_names.h"
 #include "core/photometric_response.h"
 #include "core/result.h"
 
 namespace limn::calib {
+
+/// How the images of a series name the projector's pixels; Patterns says what each code shows.
+enum class PatternCode { gray, phase, exclusive_or };
+inline constexpr EnumNames<PatternCode, 3> k_pattern_codes{{"gray", "phase", "xor"}};
+inline std::string to_text(PatternCode code) { return k_pattern_codes.text(code); }
 
 /// Images that follow each other and together illuminate every pixel alike.
 struct PatternGroup {
@@ -60,16 +66,13 @@ struct CodeOptions {
 ///   columns, then along the rows; white and black last. Step k of N is
 ///   0.5 + 0.5 cos(2 pi (x / period - k / N)) of white's light.
 struct Patterns {
-  std::string code = "gray";
+  PatternCode code = PatternCode::gray;
   int width = 0;
   int height = 0;
   CodeOptions options;  ///< options of other codes keep their defaults
 
-  /// Patterns of a known code for a size of 2 to 16384 pixels a side; options out of range are an error.
-  static Result<Patterns> create(const std::string& code,
-                                 int width,
-                                 int height,
-                                 const CodeOptions& options = {});
+  /// Patterns of a code for a size of 2 to 16384 pixels a side; options out of range are an error.
+  static Result<Patterns> create(PatternCode code, int width, int height, const CodeOptions& options = {});
 
   /// Number of finest bits that are not shown: labels from pairs alone are 2^this pixels wide. 0 except for
   /// phase.
@@ -80,7 +83,8 @@ struct Patterns {
   int base_bit() const;
   /// Width of the widest stripes of the pairs.
   int widest_stripe_px() const;
-  int steps() const { return code == "phase" ? options.steps : 0; }  ///< steps of each axis's sinusoid
+  /// Steps of each axis's sinusoid.
+  int steps() const { return code == PatternCode::phase ? options.steps : 0; }
   int images_of_bit() const { return options.inverses ? 2 : 1; }
   int first_row_bit() const { return images_of_bit() * column_bits(); }  ///< index of its first image
   int first_step() const { return images_of_bit() * (column_bits() + row_bits()); }
@@ -103,15 +107,12 @@ Result<Patterns> linearised(const Patterns& patterns,
                             const std::vector<ProjectorResponse>& responses,
                             const std::string& projector);
 
-/// Names of all codes, for messages: "gray", "phase", "xor".
-std::vector<std::string> pattern_codes();
-
 /// Reads a code's options, except "response", from a JSON object that people edit (patterns.json, a plan).
 /// Absent keys keep their defaults. Patterns::create checks their range.
 CodeOptions read_code_options(const ConfigNode& node);
 /// The keys that a code has: phase "period_px", "steps", "gamma" or "response"; xor "base_stripe_px"; gray
 /// and xor "inverses".
-std::set<std::string> code_option_keys(const std::string& code);
+std::set<std::string> code_option_keys(PatternCode code);
 
 /// The name of an image's file: `000.png` and so on.
 std::string image_name(int index);

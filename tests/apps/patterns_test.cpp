@@ -60,7 +60,8 @@ TEST(PatternsCommand, DrawsWavesByAMeasuredResponse) {
                     .ok());
     return folder / "response.json";
   };
-  PatternsOptions options{.projector = "40x24", .code = "phase", .out = folder / "patterns"};
+  PatternsOptions options{
+      .projector = "40x24", .code = calib::PatternCode::phase, .out = folder / "patterns"};
   options.linearise = file(left);
   const Status status = run_patterns(options);
   ASSERT_TRUE(status.ok()) << status.message();
@@ -74,7 +75,7 @@ TEST(PatternsCommand, DrawsWavesByAMeasuredResponse) {
   EXPECT_NE(run_patterns(options).message().find("middle, found those of left, right"), std::string::npos);
   options.name = "right";
   EXPECT_TRUE(run_patterns(options).ok());
-  options.code = "gray";
+  options.code = calib::PatternCode::gray;
   EXPECT_TRUE(run_patterns(options).error().wrong_usage);
 }
 
@@ -86,10 +87,6 @@ TEST(PatternsCommand, CallsWrongOptionsWrongUsage) {
     ASSERT_FALSE(status.ok()) << size;
     EXPECT_TRUE(status.error().wrong_usage) << size;
   }
-  const Status code = run_patterns({.projector = "40x24", .code = "rainbow", .out = out});
-  ASSERT_FALSE(code.ok());
-  EXPECT_TRUE(code.error().wrong_usage);
-  EXPECT_NE(code.message().find("gray"), std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(out));
 }
 

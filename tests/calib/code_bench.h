@@ -20,7 +20,7 @@ namespace limn::test {
 /// A camera in front of a projector: its pixels lie on straight lines of the projector's image. It computes
 /// exact light, then adds blur, gain and noise.
 struct CodeBench {
-  calib::Patterns patterns = calib::Patterns::create("gray", 64, 64).value();
+  calib::Patterns patterns = calib::Patterns::create(calib::PatternCode::gray, 64, 64).value();
   int width = 160, height = 120;
   double white = 180, black = 20;  // levels
   // Standard deviation of the projector's blur, projector pixels.

@@ -79,17 +79,18 @@ TEST(Decode, DropsUnresolvedFineBitsInsteadOfThePixel) {
 // measured noise must be that of the images.
 TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
   struct Case {
-    const char* code;
+    PatternCode code;
     CodeOptions options;
     double worst_rms;
   };
-  for (const Case& c : {Case{"gray", {}, 0.06}, Case{"phase", {}, 0.12}, Case{"xor", {}, 0.15},
-                        Case{"xor", {.base_stripe_px = 2}, 0.29}}) {
+  for (const Case& c : {Case{PatternCode::gray, {}, 0.06}, Case{PatternCode::phase, {}, 0.12},
+                        Case{PatternCode::exclusive_or, {}, 0.15},
+                        Case{PatternCode::exclusive_or, {.base_stripe_px = 2}, 0.29}}) {
     Bench bench;
     bench.patterns = Patterns::create(c.code, 64, 64, c.options).value();
     bench.blur = 0.6;
     bench.noise = 3;
-    bench.gamma = bench.patterns.code == "phase" ? 2.2 : 1;
+    bench.gamma = bench.patterns.code == PatternCode::phase ? 2.2 : 1;
     const auto decoded =
         decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height, {.floor_px = 0});
     ASSERT_TRUE(decoded.ok()) << decoded.message();
@@ -98,22 +99,22 @@ TEST(Decode, FindsPlacesBetweenWholePixelsWithTheScatterThatItStates) {
         "[ sub-pixel] %-5s %d: rms %.4f px, worst %.3f px, squared normalised error %.2f, %.1f %% within "
         "1.96, noise "
         "%.2f\n",
-        c.code, c.options.base_stripe_px, e.rms, e.worst, e.squared_pull, 100 * e.within_95,
+        to_text(c.code).c_str(), c.options.base_stripe_px, e.rms, e.worst, e.squared_pull, 100 * e.within_95,
         std::sqrt(decoded->quality.noise.read + 100 * decoded->quality.noise.per_level));
-    EXPECT_GT(decoded->share(), 0.98) << c.code;
-    EXPECT_LT(e.rms, c.worst_rms) << c.code << ": whole pixels scatter by 0.29";
-    EXPECT_LT(std::abs(e.mean), 0.01) << c.code;
-    EXPECT_GT(e.squared_pull, 0.7) << c.code;
-    EXPECT_LT(e.squared_pull, 1.3) << c.code;
-    EXPECT_GT(e.within_95, 0.92) << c.code;
-    EXPECT_LT(e.within_95, 0.98) << c.code;
+    EXPECT_GT(decoded->share(), 0.98) << to_text(c.code);
+    EXPECT_LT(e.rms, c.worst_rms) << to_text(c.code) << ": whole pixels scatter by 0.29";
+    EXPECT_LT(std::abs(e.mean), 0.01) << to_text(c.code);
+    EXPECT_GT(e.squared_pull, 0.7) << to_text(c.code);
+    EXPECT_LT(e.squared_pull, 1.3) << to_text(c.code);
+    EXPECT_GT(e.within_95, 0.92) << to_text(c.code);
+    EXPECT_LT(e.within_95, 0.98) << to_text(c.code);
     EXPECT_NEAR(std::sqrt(decoded->quality.noise.read + 100 * decoded->quality.noise.per_level), 3, 0.2)
-        << c.code;
+        << to_text(c.code);
   }
 }
 
 TEST(Decode, WhiteAndBlackStandForInversesThatAreNotShown) {
-  for (const char* code : {"gray", "xor"}) {
+  for (const PatternCode code : {PatternCode::gray, PatternCode::exclusive_or}) {
     Bench bench;
     bench.patterns = Patterns::create(code, 64, 64, {.inverses = false}).value();
     ASSERT_EQ(bench.patterns.count(), 6 + 6 + 2);
@@ -122,12 +123,12 @@ TEST(Decode, WhiteAndBlackStandForInversesThatAreNotShown) {
     const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
     ASSERT_TRUE(decoded.ok()) << decoded.message();
     const Errors e = errors_of(*decoded, bench);
-    EXPECT_GT(decoded->share(), 0.97) << code;
-    EXPECT_LT(e.rms, 0.15) << code;
-    EXPECT_LT(std::abs(e.mean), 0.01) << code;
-    EXPECT_GT(e.squared_pull, 0.6) << code;
-    EXPECT_LT(e.squared_pull, 1.4) << code;
-    EXPECT_TRUE(decoded->quality.odd.empty()) << code;
+    EXPECT_GT(decoded->share(), 0.97) << to_text(code);
+    EXPECT_LT(e.rms, 0.15) << to_text(code);
+    EXPECT_LT(std::abs(e.mean), 0.01) << to_text(code);
+    EXPECT_GT(e.squared_pull, 0.6) << to_text(code);
+    EXPECT_LT(e.squared_pull, 1.4) << to_text(code);
+    EXPECT_TRUE(decoded->quality.odd.empty()) << to_text(code);
   }
 }
 
@@ -135,7 +136,7 @@ TEST(Decode, WhiteAndBlackStandForInversesThatAreNotShown) {
 TEST(Decode, PhaseNeverTakesTheNextWave) {
   for (const double blur : {0.3, 1.6, 2.5}) {
     Bench bench;
-    bench.patterns = Patterns::create("phase", 64, 64).value();
+    bench.patterns = Patterns::create(PatternCode::phase, 64, 64).value();
     bench.blur = blur;
     bench.noise = 3;
     bench.gamma = 2.2;
@@ -151,7 +152,7 @@ TEST(Decode, PhaseNeverTakesTheNextWave) {
 
 TEST(Decode, PhaseSaysThatTheProjectorsResponseIsNotWhatItWasDrawnFor) {
   Bench bench;
-  bench.patterns = Patterns::create("phase", 64, 64, {.steps = 4, .gamma = 2.2}).value();
+  bench.patterns = Patterns::create(PatternCode::phase, 64, 64, {.steps = 4, .gamma = 2.2}).value();
   bench.blur = 0.6;
   bench.gamma = 1;
   const auto decoded = decode(bench.patterns, bench.photograph(test::test_folder()), k_width, k_height);
@@ -176,7 +177,7 @@ TEST(Decode, PhaseErrsATenthAsMuchWhenItsWavesAreDrawnByTheProjectorsResponse) {
     bench.patterns = patterns;
     return decode(patterns, bench.photograph(test::test_folder()), k_width, k_height).value();
   };
-  const Patterns plain = Patterns::create("phase", 64, 64, {.steps = 3}).value();
+  const Patterns plain = Patterns::create(PatternCode::phase, 64, 64, {.steps = 3}).value();
   const Decoded without = found(plain), with = found(linearised(plain, {measured}, "projector0").value());
   bench.patterns = plain;
   const Errors e_without = errors_of(without, bench), e = errors_of(with, bench);
@@ -228,7 +229,7 @@ class Groove {
 struct WallScore {
   double right = 0, labelled = 0;
 };
-WallScore left_wall(const std::string& code, const CodeOptions& options) {
+WallScore left_wall(PatternCode code, const CodeOptions& options) {
   Bench bench;
   bench.patterns = Patterns::create(code, 64, 64, options).value();
   bench.blur = 0.6;
@@ -252,8 +253,8 @@ WallScore left_wall(const std::string& code, const CodeOptions& options) {
 }
 
 TEST(Decode, XorHoldsInAGrooveWhoseWallsLightEachOtherAndGrayDoesNot) {
-  const WallScore gray = left_wall("gray", {}), xor4 = left_wall("xor", {}),
-                  xor2 = left_wall("xor", {.base_stripe_px = 2});
+  const WallScore gray = left_wall(PatternCode::gray, {}), xor4 = left_wall(PatternCode::exclusive_or, {}),
+                  xor2 = left_wall(PatternCode::exclusive_or, {.base_stripe_px = 2});
   printf("[ groove   ] right / labelled: gray %.3f / %.3f, xor 4 px %.3f / %.3f, xor 2 px %.3f / %.3f\n",
          gray.right, gray.labelled, xor4.right, xor4.labelled, xor2.right, xor2.labelled);
   EXPECT_LT(gray.right, 0.5);

@@ -31,7 +31,7 @@ struct FaultBench {
   calib::Board board;  ///< as described in capture.json
   std::vector<Pose> world_from_board;
   std::uint64_t seed = 1;  ///< seed of the noise
-  std::string code = "gray";
+  calib::PatternCode code = calib::PatternCode::gray;
   calib::CodeOptions code_options = {};
 
   /// The display's mode, if it is not the projector's own size.

@@ -118,17 +118,17 @@ TEST(SoundCaptures, WithOtherNoiseHaveNoFault) {
 }
 
 TEST(SoundCaptures, OfOtherCodesHaveNoFault) {
-  for (const char* code : {"phase", "xor"}) {
+  for (const PatternCode code : {PatternCode::phase, PatternCode::exclusive_or}) {
     FaultBench other = bench();
     other.code = code;
-    expect_sound(told_of(other, std::string("nothing, bench, ") + code));
+    expect_sound(told_of(other, "nothing, bench, " + to_text(code)));
   }
 }
 
 // 2.2 is assumed for projectors; no projector has exactly that.
 TEST(SoundCaptures, OfAProjectorWhoseGammaIsNearlyTheWavesHaveNoFault) {
   FaultBench near = bench();
-  near.code = "phase";
+  near.code = PatternCode::phase;
   near.world.projector_effects[0].gamma = 2.35;
   expect_sound(told_of(near, "nothing, waves for gamma 2.2 at 2.35"));
 }
@@ -208,7 +208,7 @@ TEST(Faults, ExposureFollowsTheLight) {
 
 TEST(Faults, ExposureFollowsTheLightOfNarrowStripes) {
   FaultBench automatic = bench();
-  automatic.code = "xor";
+  automatic.code = PatternCode::exclusive_or;
   automatic.before_shot = [](int, int shot, sim::World* world) {
     world->camera_effects[0].exposure = shot == k_shots - 2 ? 0.6 : shot == k_shots - 1 ? 1.0 : 0.75;
   };
@@ -218,7 +218,7 @@ TEST(Faults, ExposureFollowsTheLightOfNarrowStripes) {
 TEST(Faults, ProjectorGammaNotWhatTheWavesWereDrawnFor) {
   for (const double gamma : {1.4, 2.8}) {
     FaultBench other = bench();
-    other.code = "phase";
+    other.code = PatternCode::phase;
     other.world.projector_effects[0].gamma = gamma;
     const Told told = told_of(other, fmt::format("waves for gamma 2.2 at {}", gamma));
     expect_named(told, "projector_gamma");
@@ -283,7 +283,7 @@ TEST(Faults, CameraOutOfFocus) {
 
 TEST(Faults, CameraOutOfFocusForNarrowStripes) {
   FaultBench blurred = bench();
-  blurred.code = "xor";
+  blurred.code = PatternCode::exclusive_or;
   blurred.world.camera_effects[0].psf_px = 1.8;
   expect_named(told_of(blurred, "camera out of focus, xor"), "defocus");
 }

@@ -105,7 +105,7 @@ TEST(ImageCheck, NamesAnImageThatCameFromAnotherPose) {
 TEST(ImageCheck, NamesWhiteAndBlackThatAreTheSame) {
   const fs::path folder = test_folder(), series = folder / "pose00" / "camera0";
   capture(folder, 2, 1, {});
-  const int count = Patterns::create("gray", 16, 8).value().count();
+  const int count = Patterns::create(PatternCode::gray, 16, 8).value().count();
   copy_over(series / image_name(count - 2), series / image_name(count - 1));
   EXPECT_TRUE(names_both(said(folder), image_name(count - 2), image_name(count - 1))) << said(folder);
 }

@@ -13,13 +13,13 @@ namespace limn::calib {
 namespace {
 
 TEST(Patterns, CountAsOpenCVDoes) {
-  EXPECT_EQ(Patterns::create("gray", 1024, 768)->count(), 42);
-  EXPECT_EQ(Patterns::create("gray", 1280, 800)->count(), 44);
-  EXPECT_EQ(Patterns::create("gray", 2, 2)->count(), 6);
+  EXPECT_EQ(Patterns::create(PatternCode::gray, 1024, 768)->count(), 42);
+  EXPECT_EQ(Patterns::create(PatternCode::gray, 1280, 800)->count(), 44);
+  EXPECT_EQ(Patterns::create(PatternCode::gray, 2, 2)->count(), 6);
 }
 
 TEST(Patterns, GiveEveryPixelItsOwnCodeInTheStatedOrder) {
-  const Patterns patterns = Patterns::create("gray", 13, 6).value();
+  const Patterns patterns = Patterns::create(PatternCode::gray, 13, 6).value();
   const int column_bits = patterns.column_bits(), row_bits = patterns.row_bits();
   ASSERT_EQ(column_bits, 4);
   ASSERT_EQ(row_bits, 3);
@@ -45,9 +45,10 @@ TEST(Patterns, GiveEveryPixelItsOwnCodeInTheStatedOrder) {
 }
 
 TEST(Patterns, ExchangedBitsAreGrayCodeWithNarrowStripes) {
-  const Patterns gray = Patterns::create("gray", 64, 32).value();
+  const Patterns gray = Patterns::create(PatternCode::gray, 64, 32).value();
   for (const int stripe : {2, 4, 8}) {
-    const Patterns exchanged = Patterns::create("xor", 64, 32, {.base_stripe_px = stripe}).value();
+    const Patterns exchanged =
+        Patterns::create(PatternCode::exclusive_or, 64, 32, {.base_stripe_px = stripe}).value();
     ASSERT_EQ(exchanged.count(), gray.count());
     const int base = exchanged.column_bits() - 1 - exchanged.base_bit();  // pair of the base bit
     cv::Mat differing;
@@ -72,7 +73,7 @@ TEST(Patterns, ExchangedBitsAreGrayCodeWithNarrowStripes) {
 
 TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
   const CodeOptions options{.period_px = 20, .steps = 5, .gamma = 1.8};
-  const Patterns patterns = Patterns::create("phase", 100, 60, options).value();
+  const Patterns patterns = Patterns::create(PatternCode::phase, 100, 60, options).value();
   EXPECT_EQ(patterns.lowest_bit(), 3);  // labels of 8 pixels; half a wave is 10
   EXPECT_EQ(patterns.column_bits(), 4);
   EXPECT_EQ(patterns.count(), 2 * (4 + 3) + 2 * 5 + 2);
@@ -89,12 +90,12 @@ TEST(Patterns, WavesAreSinusoidalInLightAndTheirPairsTellThemApart) {
 }
 
 TEST(Patterns, WithoutInversesAreEverySecondImageOfThoseWith) {
-  for (const char* code : {"gray", "xor"}) {
+  for (const PatternCode code : {PatternCode::gray, PatternCode::exclusive_or}) {
     const Patterns all = Patterns::create(code, 60, 40).value();
     const Patterns sparse = Patterns::create(code, 60, 40, {.inverses = false}).value();
     ASSERT_EQ(2 * sparse.first_step(), all.first_step());
     for (int i = 0; i < sparse.first_step(); ++i)
-      EXPECT_EQ(cv::norm(sparse.image(i), all.image(2 * i), cv::NORM_INF), 0) << code << i;
+      EXPECT_EQ(cv::norm(sparse.image(i), all.image(2 * i), cv::NORM_INF), 0) << to_text(code) << i;
     EXPECT_EQ(cv::countNonZero(sparse.image(sparse.black())), 0);
     EXPECT_EQ(sparse.groups().size(), 1U);
     const auto path = test::test_folder() / "patterns.json";
@@ -110,7 +111,7 @@ TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
     response.green.push_back(0.01 + 0.99 * std::pow(v / 199.0, 1.4));
     response.blue.push_back(0.01 + 0.8 * v / 199.0);
   }
-  const Patterns plain = Patterns::create("phase", 64, 32).value();
+  const Patterns plain = Patterns::create(PatternCode::phase, 64, 32).value();
   const Patterns patterns = linearised(plain, {response}, "left").value();
   ASSERT_EQ(patterns.image(patterns.first_step()).type(), CV_8UC3);
   for (int k = 0; k < 6; ++k) {
@@ -127,7 +128,7 @@ TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
   }
   EXPECT_NE(linearised(plain, {response}, "right").message().find("right, found those of left"),
             std::string::npos);
-  const Patterns gray = Patterns::create("gray", 64, 32).value();
+  const Patterns gray = Patterns::create(PatternCode::gray, 64, 32).value();
   EXPECT_EQ(linearised(gray, {response}, "right").value(), gray);
   const auto path = test::test_folder() / "patterns.json";
   ASSERT_TRUE(save_patterns(patterns, path).ok());
@@ -138,9 +139,9 @@ TEST(Patterns, WavesOfAMeasuredResponseAreSinusoidalInEveryChannel) {
 
 TEST(Patterns, SurviveTheirFile) {
   const auto path = test::test_folder() / "patterns.json";
-  for (const auto& [code, options] : {std::pair<std::string, CodeOptions>{"gray", {}},
-                                      {"phase", {.period_px = 24, .steps = 8, .gamma = 1.7}},
-                                      {"xor", {.base_stripe_px = 2}}}) {
+  for (const auto& [code, options] : {std::pair<PatternCode, CodeOptions>{PatternCode::gray, {}},
+                                      {PatternCode::phase, {.period_px = 24, .steps = 8, .gamma = 1.7}},
+                                      {PatternCode::exclusive_or, {.base_stripe_px = 2}}}) {
     const Patterns patterns = Patterns::create(code, 1280, 800, options).value();
     ASSERT_TRUE(save_patterns(patterns, path).ok());
     const auto read = load_patterns(path);
@@ -150,16 +151,16 @@ TEST(Patterns, SurviveTheirFile) {
 }
 
 TEST(Patterns, SayWhatIsWrong) {
-  EXPECT_NE(Patterns::create("grey", 640, 480).message().find("gray"), std::string::npos);
-  EXPECT_NE(Patterns::create("phase", 640, 480, {.period_px = 3}).message().find("3"), std::string::npos);
-  EXPECT_FALSE(Patterns::create("phase", 640, 480, {.steps = 2}).ok());
-  EXPECT_FALSE(Patterns::create("phase", 640, 480, {.gamma = 0}).ok());
+  EXPECT_NE(Patterns::create(PatternCode::phase, 640, 480, {.period_px = 3}).message().find("3"),
+            std::string::npos);
+  EXPECT_FALSE(Patterns::create(PatternCode::phase, 640, 480, {.steps = 2}).ok());
+  EXPECT_FALSE(Patterns::create(PatternCode::phase, 640, 480, {.gamma = 0}).ok());
   CodeOptions falling;
   falling.response = DisplayCurves{{0, 1}, {0, 1}, {1, 0}};
-  EXPECT_FALSE(Patterns::create("phase", 640, 480, falling).ok());
-  EXPECT_FALSE(Patterns::create("xor", 640, 480, {.base_stripe_px = 3}).ok());
-  EXPECT_FALSE(Patterns::create("gray", 1, 480).ok());
-  EXPECT_FALSE(Patterns::create("gray", 640, 100000).ok());
+  EXPECT_FALSE(Patterns::create(PatternCode::phase, 640, 480, falling).ok());
+  EXPECT_FALSE(Patterns::create(PatternCode::exclusive_or, 640, 480, {.base_stripe_px = 3}).ok());
+  EXPECT_FALSE(Patterns::create(PatternCode::gray, 1, 480).ok());
+  EXPECT_FALSE(Patterns::create(PatternCode::gray, 640, 100000).ok());
   const auto path = test::test_folder() / "patterns.json";
   const std::string start =
       R"({"schema": "limn.patterns/1", "code": "gray", "size": [640, 480], "pictures": )";
@@ -168,6 +169,10 @@ TEST(Patterns, SayWhatIsWrong) {
       << load_patterns(path).message();
   ASSERT_TRUE(write_file(path, start + R"(40, "colour": 1})").ok());
   EXPECT_NE(load_patterns(path).message().find("colour"), std::string::npos);
+  ASSERT_TRUE(
+      write_file(path, R"({"schema": "limn.patterns/1", "code": "grey", "size": [8, 8], "pictures": 1})")
+          .ok());
+  EXPECT_NE(load_patterns(path).message().find("expected one of gray"), std::string::npos);
 }
 
 }  // namespace

@@ -102,8 +102,9 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
 
   // A recheck with the same devices of whatever stands there.
   const Rig rig = load_rig(options.out).value();
-  const calib::CaptureSet again = calib::plan_captures(
-      folder / "again", captures.cameras, captures.projectors, captures.board, "gray", {.inverses = false});
+  const calib::CaptureSet again =
+      calib::plan_captures(folder / "again", captures.cameras, captures.projectors, captures.board,
+                           calib::PatternCode::gray, {.inverses = false});
   const Stamp before = room.rig.now();
   const Status taken = captured_once(again, rig, stage.surroundings(&writer));
   ASSERT_TRUE(taken) << taken.message();

@@ -70,9 +70,10 @@ Result<std::string> captured_plan(const fs::path& plan_path, const fs::path& wor
 }
 
 std::string captured_plan(const std::string& board,
-                          const std::string& code,
+                          calib::PatternCode code,
                           const calib::CaptureSet& captures) {
-  ordered_json all = {{"schema", "limn.captured_plan/1"}, {"plan", {{"board", board}, {"code", code}}}};
+  ordered_json all = {{"schema", "limn.captured_plan/1"},
+                      {"plan", {{"board", board}, {"code", calib::to_text(code)}}}};
   for (const auto* devices : {&captures.cameras, &captures.projectors})
     for (const calib::CapturedDevice& device : *devices)
       all["devices"][device.name] = {device.width, device.height};

@@ -14,7 +14,7 @@ Result<std::string> captured_plan(const std::filesystem::path& plan, const std::
 
 /// The same for real devices (limn.captured_plan/1): the board, the code and the devices' sizes.
 std::string captured_plan(const std::string& board,
-                          const std::string& code,
+                          calib::PatternCode code,
                           const calib::CaptureSet& captures);
 
 /// Creates the captures folder for this plan, or accepts the one that was made with it; the plan may have got

@@ -11,7 +11,7 @@ namespace {
 std::filesystem::path read_code(const Config& config, Plan* plan) {
   const ConfigNode root = config.root();
   const auto code = root.find("code");
-  if (code) plan->code = code->choice(calib::pattern_codes());
+  if (code) plan->code = calib::k_pattern_codes.read(*code);
   const auto options = root.find("code_options");
   if (!options) return {};
   options->only(calib::code_option_keys(plan->code));

@@ -16,7 +16,7 @@ namespace limn::apps {
 struct Plan {
   std::filesystem::path world;  ///< the virtual rig's world file
   calib::Board board;
-  std::string code = "gray";
+  calib::PatternCode code = calib::PatternCode::gray;
   calib::CodeOptions code_options;
   /// Measured responses for the code phase; empty: waves are drawn with code_options.gamma.
   std::vector<ProjectorResponse> responses;

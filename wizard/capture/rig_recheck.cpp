@@ -21,7 +21,7 @@ using Json = nlohmann::ordered_json;
 // Minimum of the rig's own error, px: a smaller held-out error holds only near the calibration's poses.
 constexpr double k_least_rig_px = 0.05;
 constexpr double k_guard_s = 0.001;  // added to a measured latency
-constexpr const char* k_code_in_place = "gray";
+constexpr auto k_code_in_place = calib::PatternCode::gray;
 const calib::CodeOptions k_sparse{.inverses = false};
 constexpr const char* k_any_board = "charuco:11x8:25mm";  // for a rig whose provenance names no board
 
