@@ -565,20 +565,16 @@ void add_export(CLI::App& app, Run& run) {
       "poses.json");
   auto options = std::make_shared<ExportOptions>();
   command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write");
-  command
-      ->add_option("--profile", options->profile,
-                   "MPCDI profile: sl (shader lamps), a3 (advanced 3D) or 3d (one viewer)")
-      ->check(CLI::IsMember({"sl", "a3", "3d"}))
-      ->capture_default_str();
+  add_choice(command, "--profile", &options->profile, k_written_mpcdi_profiles,
+             "MPCDI profile: sl (shader lamps), a3 (advanced 3D) or 3d (one viewer)");
   command->add_option("--gamma", options->gamma, "Gamma of the alpha maps (gammaEmbedded); 1 is linear")
       ->capture_default_str();
   command->add_option("--bits", options->bits, "Bits of the alpha and beta maps, 8 or 16")
       ->capture_default_str();
   command->add_option("--warp", options->warp,
                       "Folder for warp-PROJECTOR.pfm or .exr, the points that the pixels light");
-  command->add_option("--format", options->format, "File format of --warp: pfm or exr (R, G, B are x, y, z)")
-      ->check(CLI::IsMember({"pfm", "exr"}))
-      ->capture_default_str();
+  add_choice(command, "--format", &options->format, k_warp_formats,
+             "File format of --warp: pfm or exr (R, G, B are x, y, z)");
   command->add_option("--looks", options->looks,
                       "Folder for look-SLOT-VARIANT.png, each variant as the viewer sees it");
   command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")

@@ -52,8 +52,9 @@ Status run_import(const ImportOptions& options) {
     fmt::print("{}\n", report.dump(2));
     return {};
   }
-  fmt::print("MPCDI {}, profile {}, {} region{}{}\n", mpcdi.version, mpcdi.profile, mpcdi.regions.size(),
-             mpcdi.regions.size() == 1 ? "" : "s", mpcdi.made_by.empty() ? "" : ", made by " + mpcdi.made_by);
+  fmt::print("MPCDI {}, profile {}, {} region{}{}\n", mpcdi.version, k_mpcdi_profiles.text(mpcdi.profile),
+             mpcdi.regions.size(), mpcdi.regions.size() == 1 ? "" : "s",
+             mpcdi.made_by.empty() ? "" : ", made by " + mpcdi.made_by);
   for (const auto& region : report["regions"]) fmt::print("{}\n", sentence_of(region));
   return {};
 }

@@ -5,13 +5,19 @@
 #include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "exchange/mpcdi.h"
 #include "exchange/projector_maps.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 
 namespace limn::apps {
+
+/// The file format of exported points; its names are also the files' extensions.
+enum class WarpFormat { pfm, exr };
+inline constexpr EnumNames<WarpFormat, 2> k_warp_formats{{"pfm", "exr"}};
 
 struct ExportOptions {
   std::filesystem::path rig;
@@ -19,12 +25,12 @@ struct ExportOptions {
   std::filesystem::path poses;   ///< POSES.json with the pose of the prototype.
   std::filesystem::path viewer;  ///< For profile 3d and looks; empty: the scene's viewer.
   std::filesystem::path mpcdi;   ///< MPCDI archive to write; empty: none.
-  std::string profile = "sl";    ///< sl, a3 or 3d
-  double gamma = 1;              ///< Gamma of the alpha maps: value = share ^ (1 / gamma).
-  int bits = 16;                 ///< Bits of the alpha and beta maps: 8 or 16.
-  std::filesystem::path warp;    ///< Folder for warp-NAME.pfm or .exr; empty: none.
-  std::string format = "pfm";    ///< pfm or exr
-  std::filesystem::path looks;   ///< Folder for look-SLOT-VARIANT.png; empty: none.
+  MpcdiProfile profile = MpcdiProfile::shader_lamps;
+  double gamma = 1;            ///< Gamma of the alpha maps: value = share ^ (1 / gamma).
+  int bits = 16;               ///< Bits of the alpha and beta maps: 8 or 16.
+  std::filesystem::path warp;  ///< Folder for warp-NAME.pfm or .exr; empty: none.
+  WarpFormat format = WarpFormat::pfm;
+  std::filesystem::path looks;  ///< Folder for look-SLOT-VARIANT.png; empty: none.
 };
 
 /// Everything that exporters read, with consistent poses.

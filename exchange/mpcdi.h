@@ -6,9 +6,25 @@
 #include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/imager.h"
 
 namespace limn::apps {
+
+/// What a file's warp maps are.
+enum class MpcdiProfile {
+  shader_lamps,  ///< sl: points, and the projectors' poses.
+  advanced_3d,   ///< a3: points.
+  from_viewer,   ///< 3d: positions in the image of one viewpoint.
+  flat           ///< 2d: positions in an image.
+};
+inline constexpr EnumNames<MpcdiProfile, 4> k_mpcdi_profiles{{"sl", "a3", "3d", "2d"}};
+/// The profiles that Limn writes.
+inline constexpr EnumNames<MpcdiProfile, 3> k_written_mpcdi_profiles{{"sl", "a3", "3d"}};
+/// Whether the warp maps are points in space.
+inline bool holds_points(MpcdiProfile profile) {
+  return profile == MpcdiProfile::shader_lamps || profile == MpcdiProfile::advanced_3d;
+}
 
 /// A pinhole image, given by the angles of its edges from the optical axis (degrees; left and down are
 /// usually negative). The axis is turned from the coordinate frame's forward direction: to the right by yaw,
@@ -56,8 +72,7 @@ struct MpcdiRegion {
 
 /// The content of a file of VESA's Multiple Projection Common Data Interchange (MPCDI).
 struct Mpcdi {
-  /// 2d, 3d (seen from one viewpoint), a3 (points) or sl (points and the projectors' poses).
-  std::string profile = "sl";
+  MpcdiProfile profile = MpcdiProfile::shader_lamps;
   std::string version = "2.0";
   std::string date;
   std::string made_by;   ///< From the file's extension; empty if it does not say.

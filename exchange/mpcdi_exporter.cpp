@@ -97,11 +97,11 @@ Mpcdi mpcdi_of(const ExportJob& job, const ExportOptions& options) {
                    cv::COLOR_GRAY2BGR);  // required by colour level 2
       region.beta = beta_map(job.maps[i].blend, find_response(job.rig, projector.name), options.bits);
     }
-    if (options.profile == "sl") {
+    if (options.profile == MpcdiProfile::shader_lamps) {
       place_frustum(projector, MpcdiFrame(), &region);
       region.distortion = places_in_frustum(*region.frustum, projector);
       region.lens = projector.lens;
-    } else if (options.profile == "3d") {
+    } else if (options.profile == MpcdiProfile::from_viewer) {
       const Pose viewer_from_prototype = job.viewer->imager_from_world * world_from_prototype;
       region.warp = places_for(*job.viewer, viewer_from_prototype, job.maps[i].points);
       Imager viewer = *job.viewer;
@@ -118,8 +118,8 @@ Mpcdi mpcdi_of(const ExportJob& job, const ExportOptions& options) {
 }
 
 Status check(const ExportOptions& options) {
-  if (options.profile != "sl" && options.profile != "a3" && options.profile != "3d")
-    return usage_error("--profile: expected sl, a3 or 3d, found '{}'.", options.profile);
+  if (options.profile == MpcdiProfile::flat)
+    return usage_error("--profile: expected sl, a3 or 3d, found 2d.");
   if (options.bits != 8 && options.bits != 16)
     return usage_error("--bits: expected 8 or 16, found {}.", options.bits);
   if (!(options.gamma >= 1 && options.gamma <= 4))
@@ -134,7 +134,8 @@ Exporter mpcdi_exporter() {
           .argument = "FILE",
           .path = &ExportOptions::mpcdi,
           .check = check,
-          .needs_viewer = [](const ExportOptions& options) { return options.profile == "3d"; },
+          .needs_viewer =
+              [](const ExportOptions& options) { return options.profile == MpcdiProfile::from_viewer; },
           .write =
               [](const ExportJob& job, const ExportOptions& options) {
                 return write_mpcdi(options.mpcdi, mpcdi_of(job, options));

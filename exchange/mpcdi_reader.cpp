@@ -8,7 +8,6 @@
 #include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <pugixml.hpp>
-#include <set>
 
 #include "core/file.h"
 #include "exchange/pfm.h"
@@ -261,11 +260,12 @@ Result<Mpcdi> Reader::read() {
 Status Reader::read_head(const xml_node& root) {
   if (!is_same_name(root.name(), "MPCDI"))
     return error("{}: expected the root element MPCDI, found '{}'.", where_, shortened(root.name()));
-  out_.profile = attribute_of(root, "profile").value();
-  std::transform(out_.profile.begin(), out_.profile.end(), out_.profile.begin(),
+  std::string profile = attribute_of(root, "profile").value();
+  std::transform(profile.begin(), profile.end(), profile.begin(),
                  [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
-  if (!std::set<std::string>{"2d", "3d", "a3", "sl"}.contains(out_.profile))
-    return error("{}: profile: expected 2d, 3d, a3 or sl, found '{}'.", where_, shortened(out_.profile));
+  const auto known = k_mpcdi_profiles.find(profile);
+  if (!known) return error("{}: profile: expected 2d, 3d, a3 or sl, found '{}'.", where_, shortened(profile));
+  out_.profile = *known;
   out_.version = attribute_of(root, "version").value();
   if (!out_.version.starts_with("1.") && !out_.version.starts_with("2."))
     return error("{}: version: expected 1.0 or 2.0, found '{}'.", where_, shortened(out_.version));
@@ -368,7 +368,7 @@ Result<MpcdiBlendMap> Reader::read_blend_map(const xml_node& map,
 // Missing nodes become NaN; points become metres.
 Status Reader::read_warp(const xml_node& node, const std::string& where, MpcdiRegion* region) {
   const std::string unit = trimmed(child_of(node, "geometricUnit").text().get());
-  const bool has_points = out_.profile == "a3" || out_.profile == "sl";
+  const bool has_points = holds_points(out_.profile);
   const auto metres = metres_of(unit);
   if (metres) units_[region->id] = *metres;
   if (has_points && !metres && !unit.empty() && unit != "unknown")
@@ -455,12 +455,12 @@ Status Reader::read_extensions(const xml_node& set) {
 Status Reader::check_regions() {
   for (MpcdiRegion& region : out_.regions) {
     const std::string where = fmt::format("{}: region '{}'", where_, region.id);
-    if (out_.profile == "sl" && !(region.frustum && region.frame))
+    if (out_.profile == MpcdiProfile::shader_lamps && !(region.frustum && region.frame))
       return error("{}: expected a frustum and a coordinateFrame in profile sl, found at most one of them.",
                    where);
-    if (out_.profile != "sl" && region.warp.empty())
+    if (out_.profile != MpcdiProfile::shader_lamps && region.warp.empty())
       return error("{}: expected a fileset with a geometryWarpFile in profile {}, found none.", where,
-                   out_.profile);
+                   k_mpcdi_profiles.text(out_.profile));
     if (region.frustum && !region.has_other_lens)
       LIMN_TRY_STATUS(check_angles(*region.frustum, where + ": frustum"));
     if (const auto unit = units_.find(region.id); region.frame && unit != units_.end())

@@ -59,14 +59,14 @@ ordered_json report_of(const MpcdiRegion& region, bool has_points) {
 
 nlohmann::ordered_json mpcdi_report(const Mpcdi& mpcdi) {
   nlohmann::ordered_json json = {{"schema", "limn.import/1"},
-                                 {"profile", mpcdi.profile},
+                                 {"profile", k_mpcdi_profiles.text(mpcdi.profile)},
                                  {"version", mpcdi.version},
                                  {"made_by", mpcdi.made_by},
                                  {"date", mpcdi.date},
                                  {"remarks", mpcdi.remarks},
                                  {"regions", nlohmann::ordered_json::array()}};
-  const bool has_points = mpcdi.profile == "a3" || mpcdi.profile == "sl";
-  for (const MpcdiRegion& region : mpcdi.regions) json["regions"].push_back(report_of(region, has_points));
+  for (const MpcdiRegion& region : mpcdi.regions)
+    json["regions"].push_back(report_of(region, holds_points(mpcdi.profile)));
   return json;
 }
 

@@ -123,7 +123,7 @@ void add_extension(pugi::xml_node root, const Mpcdi& mpcdi) {
 Status write_mpcdi(const std::filesystem::path& path, const Mpcdi& mpcdi) {
   pugi::xml_document document;
   pugi::xml_node root = document.append_child("MPCDI");
-  root.append_attribute("profile") = mpcdi.profile.c_str();
+  root.append_attribute("profile") = k_mpcdi_profiles.text(mpcdi.profile).c_str();
   root.append_attribute("geometry") = 2;  // warps with one node for each pixel
   root.append_attribute("color") = mpcdi.colour_level;
   root.append_attribute("date") = mpcdi.date.c_str();
@@ -134,7 +134,7 @@ Status write_mpcdi(const std::filesystem::path& path, const Mpcdi& mpcdi) {
   std::vector<ZipFile> files(1);
   for (std::size_t i = 0; i < mpcdi.regions.size(); ++i) {
     add_region(buffer, mpcdi.regions[i]);
-    add_fileset(list, mpcdi.regions[i], mpcdi.profile == "a3" || mpcdi.profile == "sl", i, &files);
+    add_fileset(list, mpcdi.regions[i], holds_points(mpcdi.profile), i, &files);
   }
   add_extension(root, mpcdi);
   std::ostringstream xml;

@@ -15,20 +15,15 @@ namespace {
 Status write_warps(const ExportJob& job, const ExportOptions& options) {
   LIMN_TRY_STATUS(make_folder(options.warp));
   for (std::size_t i = 0; i < job.maps.size(); ++i) {
-    const std::string name = fmt::format("warp-{}.{}", job.rig.projectors[i].name, options.format);
+    const std::string name =
+        fmt::format("warp-{}.{}", job.rig.projectors[i].name, k_warp_formats.text(options.format));
     const std::string bytes =
-        options.format == "pfm"
+        options.format == WarpFormat::pfm
             ? pfm_bytes(job.maps[i].points)
             : exr_bytes(job.maps[i].points,
                         "R, G, B: x, y, z (m) of the prototype's point that the pixel lights; NaN: none");
     LIMN_TRY_STATUS(write_file(options.warp / name, bytes));
   }
-  return {};
-}
-
-Status check(const ExportOptions& options) {
-  if (options.format != "pfm" && options.format != "exr")
-    return usage_error("--format: expected pfm or exr, found '{}'.", options.format);
   return {};
 }
 
@@ -38,7 +33,7 @@ Exporter warp_exporter() {
   return {.name = "warp",
           .argument = "DIR",
           .path = &ExportOptions::warp,
-          .check = check,
+          .check = [](const ExportOptions&) { return Status(); },
           .needs_viewer = [](const ExportOptions&) { return false; },
           .write = write_warps};
 }
