@@ -44,6 +44,8 @@ int finished(const Status& status) {
   return status.error().wrong_usage ? 2 : 1;
 }
 
+constexpr EnumNames<bool, 2> k_off_on{{"off", "on"}};
+
 // An option whose value is one of an enum's names. The help shows the present value as the default.
 template <class Enum, std::size_t Count>
 CLI::Option* add_choice(CLI::App* command,
@@ -143,14 +145,10 @@ void add_detect(CLI::App& app, Run& run) {
                       "Camera file: .cameramodel, OpenCV YAML or ARToolKit camera_para.dat");
   command->add_option("--size-mm", options->size_mm,
                       "Side of the black square in mm; with --camera it gives poses");
-  command
-      ->add_option("--pose", options->pose,
-                   "How poses are computed: ippe, or triangle (the method of the 2011 paper)")
-      ->capture_default_str();
-  command
-      ->add_option("--encoding", options->encoding,
-                   "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)")
-      ->capture_default_str();
+  add_choice(command, "--pose", &options->pose, k_pose_methods,
+             "How poses are computed: ippe, or triangle (the method of the 2011 paper)");
+  add_choice(command, "--encoding", &options->encoding, tracker::k_encodings,
+             "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)");
   command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
   command->add_option("--json", options->json, "JSON file to write: corners, poses, covariances");
   command->add_option("--draw", options->draw, "Folder for copies of the images with the markers drawn in");
@@ -477,37 +475,25 @@ void add_render(CLI::App& app, Run& run) {
   command->add_option("--viewer", options->viewers,
                       "Viewer file; repeat the option for several viewers, who share one viewpoint in which "
                       "the nearest counts most. Without it: the scene's viewers, or else camera 0");
-  command
-      ->add_option("--composite", options->composite,
-                   "What composites draw: full (whole parts) or rest (only what light cannot show)")
-      ->check(CLI::IsMember({"full", "rest"}))
-      ->capture_default_str();
+  add_choice(command, "--composite", &options->composite, k_composites,
+             "What composites draw: full (whole parts) or rest (only what light cannot show)");
   command->add_flag("--undistorted", options->undistorted,
                     "Remove the lens distortion of the cameras from the composites");
-  command
-      ->add_option("--contact-shadow", options->contact_shadow,
-                   "on: parts darken the prototype around them in composites and view.png; off: pixels "
-                   "beside parts keep their values")
-      ->check(CLI::IsMember({"on", "off"}))
-      ->capture_default_str();
-  command
-      ->add_option("--marker-light", options->marker_light,
-                   "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)")
-      ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
-      ->capture_default_str();
+  add_choice(command, "--contact-shadow", &options->contact_shadow, k_off_on,
+             "on: parts darken the prototype around them in composites and view.png; off: pixels beside "
+             "parts keep their values");
+  add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
+             "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
   command->add_option(
       "--view", options->view,
       "Viewer file of a virtual camera; writes view.png with prototype and parts as it sees them");
   command->add_option(
       "--stereo", options->stereo_mm,
       "With --view: distance between two virtual cameras in mm; view.png shows their images side by side");
-  command
-      ->add_option("--compensation", options->light.compensation,
-                   "What the projected light compensates for: none; geometry (distance, incidence, "
-                   "vignetting and the scene's albedo); measured (albedo, colours, ambient and black light "
-                   "as measured by the rig's response images)")
-      ->check(CLI::IsMember({"none", "geometry", "measured"}))
-      ->capture_default_str();
+  add_choice(command, "--compensation", &options->light.compensation, k_compensations,
+             "What the projected light compensates for: none; geometry (distance, incidence, vignetting and "
+             "the scene's albedo); measured (albedo, colours, ambient and black light as measured by the "
+             "rig's response images)");
   command->add_option(
       "--measured-at", options->light.measured_at,
       "POSES.json with the prototype's pose in the response images; without it, the pose where it is drawn");
@@ -515,12 +501,9 @@ void add_render(CLI::App& app, Run& run) {
       "--level", options->light.level,
       "With compensation: brightness of white as an irradiance, where 1 is a projector's white at 1 m "
       "distance and normal incidence; without it, the level that four fifths of the prototype can reach");
-  command
-      ->add_option(
-          "--black", options->light.black,
-          "Black light of the projectors: as-is, or even (overlaps of projectors do not show in the dark)")
-      ->check(CLI::IsMember({"as-is", "even"}))
-      ->capture_default_str();
+  add_choice(
+      command, "--black", &options->light.even_black, k_blacks,
+      "Black light of the projectors: as-is, or even (overlaps of projectors do not show in the dark)");
   command->add_option("--out", options->out, "Folder for the images and coverage.json")->required();
   command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });
 }
@@ -648,16 +631,10 @@ void add_live(CLI::App& app, Run& run) {
                       "Folder for poses.csv, telemetry.csv, session.html and the last images");
   command->add_flag("--window", options->window,
                     "Open the operator's window: images, devices, parts, looks, telemetry, keys");
-  command
-      ->add_option("--prediction", options->prediction,
-                   "How poses are predicted for the moment when the light is shown: hold, linear or filtered")
-      ->check(CLI::IsMember({"hold", "linear", "filtered"}))
-      ->capture_default_str();
-  command
-      ->add_option("--marker-light", options->marker_light,
-                   "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)")
-      ->check(CLI::IsMember({"as-is", "keep-out", "spotlight"}))
-      ->capture_default_str();
+  add_choice(command, "--prediction", &options->prediction, tracker::k_predictions,
+             "How poses are predicted for the moment when the light is shown: hold, linear or filtered");
+  add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
+             "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
   command->add_option("--osc", options->osc,
                       "PORT or ADDRESS:PORT at which OSC messages of other programs are received; a port "
                       "alone accepts this machine only");

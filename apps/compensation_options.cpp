@@ -13,13 +13,6 @@ namespace fs = std::filesystem;
 using projector::Compensation;
 using projector::MeasuredSurface;
 
-std::optional<Compensation> compensation_of(const std::string& word) {
-  if (word == "none") return Compensation::none;
-  if (word == "geometry") return Compensation::geometry;
-  if (word == "measured") return Compensation::measured;
-  return std::nullopt;
-}
-
 // The surface as the first camera that measured it under every projector saw it.
 Result<MeasuredSurface> load_surface(const fs::path& response_json,
                                      const Rig& rig,
@@ -51,19 +44,11 @@ Status set_light(const LightArguments& arguments,
                  const scene::Scene& scene,
                  const scene::PosedScene& posed,
                  projector::Renderer* renderer) {
-  const auto compensation = compensation_of(arguments.compensation);
-  if (!compensation) {
-    return usage_error("--compensation: expected none, geometry or measured, found '{}'.",
-                       arguments.compensation);
-  }
-  if (arguments.black != "as-is" && arguments.black != "even") {
-    return usage_error("--black: expected as-is or even, found '{}'.", arguments.black);
-  }
   if (arguments.level && !(*arguments.level > 0 && std::isfinite(*arguments.level))) {
     return usage_error("--level: expected an irradiance over 0, such as 0.5, found {}.", *arguments.level);
   }
-  const projector::LightOptions options{*compensation, arguments.black == "even", arguments.level};
-  if (*compensation != Compensation::measured) return renderer->set_light(options);
+  const projector::LightOptions options{arguments.compensation, arguments.even_black, arguments.level};
+  if (arguments.compensation != Compensation::measured) return renderer->set_light(options);
   std::optional<Pose> measured_at = posed.world_from_prototype;
   if (!arguments.measured_at.empty()) {
     LIMN_TRY(const scene::PosedScene then, scene::load_poses(arguments.measured_at, scene));
@@ -82,8 +67,8 @@ Status set_light(const LightArguments& arguments,
 nlohmann::ordered_json light_report(const LightArguments& arguments,
                                     const Rig& rig,
                                     const projector::Renderer& renderer) {
-  nlohmann::ordered_json json = {{"compensation", arguments.compensation},
-                                 {"black", arguments.black},
+  nlohmann::ordered_json json = {{"compensation", k_compensations.text(arguments.compensation)},
+                                 {"black", k_blacks.text(arguments.even_black)},
                                  {"projectors", nlohmann::ordered_json::array()}};
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const cv::Mat clipped = renderer.clipped(i);
@@ -100,7 +85,7 @@ nlohmann::ordered_json light_report(const LightArguments& arguments,
     sum += response.black_level->value;
     most = std::max(most, response.black_level->value);
   }
-  if (arguments.black == "even" && most > 0) {
+  if (arguments.even_black && most > 0) {
     json["contrast"] = 1 / sum;
     json["contrast_as_is"] = 1 / most;
   }

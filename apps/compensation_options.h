@@ -3,22 +3,27 @@
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
-#include <string>
 
+#include "core/enum_names.h"
 #include "projector/renderer.h"
 
 namespace limn::apps {
 
+/// The names of --compensation, also in coverage.json.
+inline constexpr EnumNames<projector::Compensation, 3> k_compensations{{"none", "geometry", "measured"}};
+/// The names of --black, also in coverage.json: whether black is even.
+inline constexpr EnumNames<bool, 2> k_blacks{{"as-is", "even"}};
+
 /// The options of a command for the balance of the projectors' light.
 struct LightArguments {
-  std::string compensation = "none";  ///< none, geometry or measured
-  std::string black = "as-is";        ///< as-is or even
+  projector::Compensation compensation = projector::Compensation::none;
+  bool even_black = false;            ///< LightOptions::even_black
   std::optional<double> level;        ///< LightOptions::level
   std::filesystem::path measured_at;  ///< POSES.json of the response images; empty: the prototype as posed.
 };
 
 /// Sets the light of the renderer. `measured` takes the first camera of the rig for which response.json,
-/// beside rig.json, holds the colour mixing with every projector. Errors: unknown words, no such camera, a
+/// beside rig.json, holds the colour mixing with every projector. Errors: no such camera, a
 /// prototype without a pose, a level that is not positive.
 Status set_light(const LightArguments& arguments,
                  const std::filesystem::path& rig_path,

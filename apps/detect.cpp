@@ -85,7 +85,7 @@ std::vector<tracker::MarkerPose> poses_of(const tracker::Detection& detection,
                                           const DetectOptions& options) {
   const double size_m = options.size_mm * 1e-3;
   auto poses = tracker::marker_poses(lens, size_m, detection.corners_px, detection.corner_covariance);
-  if (options.pose == "ippe") return poses;
+  if (options.pose == PoseMethod::ippe) return poses;
   const auto pose = tracker::triangle_pose(lens, size_m, detection.corners_px);
   if (!pose) return {};
   // The paper's method gives no covariance. That of the refined pose, which it approximates, is the best
@@ -271,7 +271,7 @@ void detect_all(const DetectOptions& options,
   Progress progress("detect", count);
   tracker::DetectorOptions detector_options;
   detector_options.threads = std::clamp(options.threads / threads, 1, cv::getNumberOfCPUs());
-  if (options.encoding == "srgb") detector_options.encoding = tracker::Encoding::srgb;
+  detector_options.encoding = options.encoding;
   const auto work = [&] {
     tracker::Detector detector(families, detector_options);
     for (int i = next++; i < count; i = next++) {
@@ -290,10 +290,6 @@ void detect_all(const DetectOptions& options,
 
 Status checked(const DetectOptions& options) {
   if (options.images.empty()) return usage_error("limn detect: expected images, found none.");
-  if (options.pose != "ippe" && options.pose != "triangle")
-    return usage_error("--pose: expected ippe or triangle, found '{}'.", options.pose);
-  if (options.encoding != "linear" && options.encoding != "srgb")
-    return usage_error("--encoding: expected linear or srgb, found '{}'.", options.encoding);
   if (!std::isfinite(options.size_mm) || options.size_mm < 0)
     return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
   if (options.size_mm > 0 && options.camera.empty())

@@ -120,15 +120,8 @@ Status check_fits(const Rig& rig, const Rig& devices) {
 
 // Copies the options into the setup, except those for devices and virtual rig.
 Status set_up(const LiveOptions& options, SessionSetup* setup) {
-  const auto prediction = tracker::prediction_of(options.prediction);
-  if (!prediction)
-    return usage_error("--prediction: expected hold, linear or filtered, found '{}'.", options.prediction);
-  setup->paint.prediction = *prediction;
-  const auto marker_light = tracker::marker_light_of(options.marker_light);
-  if (!marker_light)
-    return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
-                       options.marker_light);
-  setup->paint.marker_light = *marker_light;
+  setup->paint.prediction = options.prediction;
+  setup->paint.marker_light = options.marker_light;
   setup->paint.refill = options.refill;
   setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
   setup->paint.motion = setup->watch.motion;

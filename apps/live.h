@@ -4,6 +4,8 @@
 #include <string>
 
 #include "core/result.h"
+#include "tracker/marker_light.h"
+#include "tracker/predict.h"
 
 namespace limn::apps {
 
@@ -19,8 +21,8 @@ struct LiveOptions {
   std::filesystem::path record;
   std::filesystem::path out;
   bool window = false;
-  std::string prediction = "filtered";
-  std::string marker_light = "keep-out";
+  tracker::Prediction prediction = tracker::Prediction::filtered;
+  tracker::MarkerLight marker_light = tracker::MarkerLight::keep_out;
   bool refill = true;          ///< Other projectors fill shadows.
   double extrapolate_s = 0.3;  ///< How long unseen markers are extrapolated.
   std::string osc;             ///< PORT or ADDRESS:PORT at which OSC is received; empty: none.

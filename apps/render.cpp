@@ -247,7 +247,6 @@ Status write_composites(projector::Renderer* renderer,
                         const Rig& rig,
                         const Frames& frames,
                         const scene::PosedScene& posed) {
-  const auto what = options.composite == "rest" ? projector::Composite::rest : projector::Composite::full;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const Imager& camera = rig.cameras[i];
     cv::Mat behind = frames[i];
@@ -256,7 +255,7 @@ Status write_composites(projector::Renderer* renderer,
     }
     if (behind.empty()) continue;
     const auto file = options.out / ("composite-" + camera.name + ".png");
-    const cv::Mat image = renderer->composite(i, behind, posed, what);
+    const cv::Mat image = renderer->composite(i, behind, posed, options.composite);
     LIMN_TRY_STATUS(write_png(file, options.undistorted ? undistorted(image, camera) : image));
   }
   return {};
@@ -288,17 +287,6 @@ Status run_render(const RenderOptions& options) {
     return usage_error(
         "expected --frame CAMERA=IMAGE or --poses POSES.json to place the scene, found neither.");
   }
-  if (options.composite != "full" && options.composite != "rest") {
-    return usage_error("--composite: expected full or rest, found '{}'.", options.composite);
-  }
-  if (options.contact_shadow != "on" && options.contact_shadow != "off") {
-    return usage_error("--contact-shadow: expected on or off, found '{}'.", options.contact_shadow);
-  }
-  const auto marker_light = tracker::marker_light_of(options.marker_light);
-  if (!marker_light) {
-    return usage_error("--marker-light: expected as-is, keep-out or spotlight, found '{}'.",
-                       options.marker_light);
-  }
   if (options.stereo_mm && options.view.empty())
     return usage_error(
         "--stereo: expected --view VIEWER.json with it, which places the cameras, found none.");
@@ -320,15 +308,16 @@ Status run_render(const RenderOptions& options) {
   log_info("render: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
   LIMN_TRY_STATUS(set_light(options.light, options.rig, rig, scene, posed, &renderer));
-  if (options.contact_shadow == "on") LIMN_TRY_STATUS(renderer.set_contact_shadow(&scene));
-  const bool is_balanced = options.light.compensation != "none" || options.light.black != "as-is";
+  if (options.contact_shadow) LIMN_TRY_STATUS(renderer.set_contact_shadow(&scene));
+  const bool is_balanced =
+      options.light.compensation != projector::Compensation::none || options.light.even_black;
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<Track> tracks = tracks_of(scene, posed);
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const auto file = options.out / ("projector-" + rig.projectors[i].name + ".png");
     const cv::Mat image = renderer.projector_image(i, posed, viewer);
     const cv::Mat mask = tracker::marker_mask(rig.projectors[i], bodies, tracks);
-    LIMN_TRY_STATUS(write_png(file, tracker::with_marker_light(image, mask, *marker_light)));
+    LIMN_TRY_STATUS(write_png(file, tracker::with_marker_light(image, mask, options.marker_light)));
     if (is_balanced)
       LIMN_TRY_STATUS(
           write_png(options.out / ("clipped-" + rig.projectors[i].name + ".png"), renderer.clipped(i)));

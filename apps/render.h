@@ -6,9 +6,15 @@
 #include <vector>
 
 #include "apps/compensation_options.h"
+#include "core/enum_names.h"
 #include "core/result.h"
+#include "projector/renderer.h"
+#include "tracker/marker_light.h"
 
 namespace limn::apps {
+
+/// The names of --composite.
+inline constexpr EnumNames<projector::Composite, 2> k_composites{{"rest", "full"}};
 
 struct RenderOptions {
   std::filesystem::path rig;
@@ -18,14 +24,13 @@ struct RenderOptions {
   /// Viewer files; empty: the scene's viewers, or else camera 0. Several viewers share one viewpoint
   /// (scene/viewpoint.h), as if all had just arrived.
   std::vector<std::filesystem::path> viewers;
-  std::string composite = "full";  ///< full, or rest: only what light cannot show.
-  bool undistorted = false;        ///< Composites without the cameras' lens distortion.
-  /// Light on markers: as-is, keep-out (dark) or spotlight (white).
-  std::string marker_light = "as-is";
+  projector::Composite composite = projector::Composite::full;
+  bool undistorted = false;  ///< Composites without the cameras' lens distortion.
+  tracker::MarkerLight marker_light = tracker::MarkerLight::as_is;
   LightArguments light;
-  std::string contact_shadow = "off";  ///< on: parts darken the prototype around them in composites and view.
-  std::filesystem::path view;          ///< Viewer file of a virtual camera: writes view.png.
-  std::optional<double> stereo_mm;     ///< Base line: two cameras side by side; view.png is twice as wide.
+  bool contact_shadow = false;      ///< Parts darken the prototype around them in composites and view.
+  std::filesystem::path view;       ///< Viewer file of a virtual camera: writes view.png.
+  std::optional<double> stereo_mm;  ///< Base line: two cameras side by side; view.png is twice as wide.
   std::filesystem::path out;
 };
 

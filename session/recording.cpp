@@ -48,21 +48,14 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
             {"starts_per_s", motion.starts_per_s},
             {"stops_per_s", motion.stops_per_s},
             {"extrapolation_limit_s", motion.extrapolation_limit_s}}},
-          {"prediction", tracker::prediction_names()[static_cast<std::size_t>(paint.prediction)]},
-          {"marker_light", tracker::marker_light_names()[static_cast<std::size_t>(paint.marker_light)]},
+          {"prediction", tracker::k_predictions.text(paint.prediction)},
+          {"marker_light", tracker::k_marker_lights.text(paint.marker_light)},
           {"fade_s", paint.fade_s},
           {"label_s", paint.label_s},
           {"lost_s", paint.lost_s},
           {"stereo_mm", paint.stereo_mm},
           {"refill", paint.refill},
           {"screens", setup.screens}};
-}
-
-template <class T>
-T read_choice(const ConfigNode& node, const std::vector<std::string>& names) {
-  const std::string name = node.choice(names);
-  const auto found = std::find(names.begin(), names.end(), name);
-  return static_cast<T>(found == names.end() ? 0 : found - names.begin());
 }
 
 }  // namespace
@@ -232,10 +225,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   model.stops_per_s = motion.at("stops_per_s").positive();
   model.extrapolation_limit_s = motion.at("extrapolation_limit_s").positive();
   setup.paint.motion = model;
-  setup.paint.prediction =
-      read_choice<tracker::Prediction>(root.at("prediction"), tracker::prediction_names());
-  setup.paint.marker_light =
-      read_choice<tracker::MarkerLight>(root.at("marker_light"), tracker::marker_light_names());
+  setup.paint.prediction = tracker::k_predictions.read(root.at("prediction"));
+  setup.paint.marker_light = tracker::k_marker_lights.read(root.at("marker_light"));
   setup.paint.fade_s = root.at("fade_s").positive();
   setup.paint.label_s = root.at("label_s").positive();
   setup.paint.lost_s = root.at("lost_s").positive();

@@ -74,18 +74,6 @@ cv::Mat marker_mask(const Imager& projector,
   return mask;
 }
 
-const std::vector<std::string>& marker_light_names() {
-  static const std::vector<std::string> names = {"as-is", "keep-out", "spotlight"};
-  return names;
-}
-
-std::optional<MarkerLight> marker_light_of(const std::string& name) {
-  const std::vector<std::string>& names = marker_light_names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) return std::nullopt;
-  return static_cast<MarkerLight>(found - names.begin());
-}
-
 cv::Mat with_marker_light(const cv::Mat& image, const cv::Mat& mask, MarkerLight how) {
   LIMN_CHECK(image.size() == mask.size());
   cv::Mat out = image.clone();

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/imager.h"
 #include "core/marker.h"
 #include "core/track.h"
@@ -36,10 +36,8 @@ enum class MarkerLight {
   spotlight  ///< even white: in a dark room the projector itself makes them visible
 };
 
-/// Their names for users (as-is, keep-out, spotlight), in the order of MarkerLight.
-const std::vector<std::string>& marker_light_names();
-/// nullopt for an unknown name.
-std::optional<MarkerLight> marker_light_of(const std::string& name);
+/// Their names for users.
+inline constexpr EnumNames<MarkerLight, 3> k_marker_lights{{"as-is", "keep-out", "spotlight"}};
 
 /// The image (8-bit, display values) with that treatment of the markers in a mask.
 cv::Mat with_marker_light(const cv::Mat& image, const cv::Mat& mask, MarkerLight how);

@@ -50,18 +50,6 @@ Believed believed(const BodyFilter& known, double seconds, Prediction how, const
 
 }  // namespace
 
-const std::vector<std::string>& prediction_names() {
-  static const std::vector<std::string> names = {"hold", "linear", "filtered"};
-  return names;
-}
-
-std::optional<Prediction> prediction_of(const std::string& name) {
-  const std::vector<std::string>& names = prediction_names();
-  const auto found = std::find(names.begin(), names.end(), name);
-  if (found == names.end()) return std::nullopt;
-  return static_cast<Prediction>(found - names.begin());
-}
-
 std::vector<Track> predicted(std::span<const BodyFilter> known,
                              Stamp at,
                              Prediction how,

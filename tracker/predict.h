@@ -2,9 +2,9 @@
 
 #include <optional>
 #include <span>
-#include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/track.h"
 #include "tracker/body_filter.h"
 
@@ -17,10 +17,8 @@ enum class Prediction {
   filtered  ///< by the filter's position, velocity and acceleration
 };
 
-/// Their names for users (hold, linear, filtered), in the order of Prediction.
-const std::vector<std::string>& prediction_names();
-/// nullopt for an unknown name.
-std::optional<Prediction> prediction_of(const std::string& name);
+/// Their names for users.
+inline constexpr EnumNames<Prediction, 3> k_predictions{{"hold", "linear", "filtered"}};
 
 /// The track of every known body at a moment. A moment before the body's measured_at gets the pose at
 /// measured_at. The covariance grows with the time since then. A body in the newest image is `measured`; one

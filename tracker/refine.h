@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/lens.h"
 #include "tracker/candidates.h"
 
@@ -16,6 +17,8 @@ enum class Encoding {
   linear,  ///< proportional to light: machine-vision cameras
   srgb     ///< the sRGB curve: webcams, photographs
 };
+/// Their names for users.
+inline constexpr EnumNames<Encoding, 2> k_encodings{{"linear", "srgb"}};
 
 enum class Effort {
   rough,  ///< some rows of each side, one round: good to a tenth of a pixel, enough to read the cells

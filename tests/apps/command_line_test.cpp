@@ -133,6 +133,28 @@ TEST_F(CommandLine, UnknownFamiliesAndCodesAreWrongUsageAndListWhatExists) {
   expect({"patterns", "--projector", "1280", "--out", path("p")}, 2, {"1280"});
 }
 
+TEST_F(CommandLine, WordsOutsideAClosedSetAreWrongUsageAndListTheSet) {
+  const std::vector<std::string> render = {"render",           "--rig",       path("rig"),
+                                           "--scene",          path("scene"), "--poses",
+                                           path("poses.json"), "--out",       path("out")};
+  const auto with = [](std::vector<std::string> words, const char* option, const char* word) {
+    words.insert(words.end(), {option, word});
+    return words;
+  };
+  expect(with(render, "--composite", "half"), 2, {"--composite", "half", "rest", "full"});
+  expect(with(render, "--contact-shadow", "maybe"), 2, {"--contact-shadow", "on", "off"});
+  expect(with(render, "--marker-light", "dim"), 2, {"--marker-light", "keep-out"});
+  expect(with(render, "--compensation", "all"), 2, {"--compensation", "geometry"});
+  expect(with(render, "--black", "odd"), 2, {"--black", "even"});
+  expect({"detect", "x.png", "--pose", "guess"}, 2, {"--pose", "ippe"});
+  expect({"detect", "x.png", "--encoding", "log"}, 2, {"--encoding", "srgb"});
+  const std::vector<std::string> exporting = {"export",      "--warp",    path("warps"),
+                                              "--rig",       path("rig"), "--scene",
+                                              path("scene"), "--poses",   path("poses.json")};
+  expect(with(exporting, "--format", "tiff"), 2, {"--format", "pfm"});
+  expect(with(exporting, "--profile", "2d"), 2, {"--profile", "a3"});
+}
+
 TEST_F(CommandLine, MissingAndTruncatedImagesAreNamed) {
   expect({"detect", path("nowhere.png")}, 1, {"nowhere.png"});
   cv::Mat grey(480, 640, CV_8U, cv::Scalar(128));

@@ -214,7 +214,7 @@ TEST_F(RenderDoor, SeveralViewersShareTheEyeOfThoseOnTheNearestOnesSide) {
 }
 
 TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
-  const auto light_on_marker = [&](const std::string& how) {
+  const auto light_on_marker = [&](tracker::MarkerLight how) {
     options.marker_light = how;
     EXPECT_TRUE(run_render(options));
     const cv::Mat light = read_image(folder / "out/projector-projector0.png").value();
@@ -225,18 +225,16 @@ TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
         light.at<cv::Vec3b>(static_cast<int>(std::lround(px.y())), static_cast<int>(std::lround(px.x())));
     return std::array<int, 3>{c[0], c[1], c[2]};
   };
-  EXPECT_EQ(light_on_marker("spotlight"), (std::array{255, 255, 255}));
-  EXPECT_EQ(light_on_marker("keep-out"), (std::array{0, 0, 0}));
-  EXPECT_NE(light_on_marker("as-is"), (std::array{255, 255, 255}));
-  options.marker_light = "dim";
-  EXPECT_TRUE(run_render(options).error().wrong_usage);
+  EXPECT_EQ(light_on_marker(tracker::MarkerLight::spotlight), (std::array{255, 255, 255}));
+  EXPECT_EQ(light_on_marker(tracker::MarkerLight::keep_out), (std::array{0, 0, 0}));
+  EXPECT_NE(light_on_marker(tracker::MarkerLight::as_is), (std::array{255, 255, 255}));
 }
 
 TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   ASSERT_TRUE(run_render(options));
   const cv::Mat as_it_is = read_image(folder / "out/projector-projector0.png").value();
   EXPECT_FALSE(fs::exists(folder / "out/clipped-projector0.png"));
-  options.light.compensation = "geometry";
+  options.light.compensation = projector::Compensation::geometry;
   options.light.level = 1e6;
   ASSERT_TRUE(run_render(options));
   const cv::Mat clipped = read_image(folder / "out/clipped-projector0.png").value();
@@ -249,7 +247,7 @@ TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   const cv::Mat balanced = read_image(folder / "out/projector-projector0.png").value();
   EXPECT_GT(cv::norm(as_it_is, balanced, cv::NORM_INF), 5);
 
-  options.light.compensation = "measured";
+  options.light.compensation = projector::Compensation::measured;
   const Status status = run_render(options);
   ASSERT_FALSE(status);
   EXPECT_NE(status.message().find("response.json"), std::string::npos) << status.message();
