@@ -6,6 +6,7 @@
 #include <functional>
 #include <iostream>
 #include <memory>
+#include <optional>
 
 #include "apps/align.h"
 #include "apps/bench.h"
@@ -57,6 +58,17 @@ CLI::Option* add_choice(CLI::App* command,
   return command->add_option_function<std::string>(name, keep, help)
       ->check(CLI::IsMember(names.all()))
       ->default_str(names.text(*value));
+}
+
+// The same for an option without a default.
+template <class Enum, std::size_t Count>
+CLI::Option* add_choice(CLI::App* command,
+                        const std::string& name,
+                        std::optional<Enum>* value,
+                        const EnumNames<Enum, Count>& names,
+                        const std::string& help) {
+  const auto keep = [value, &names](const std::string& text) { *value = names.find(text); };
+  return command->add_option_function<std::string>(name, keep, help)->check(CLI::IsMember(names.all()));
 }
 
 void add_demo(CLI::App& app, Run& run) {
@@ -426,11 +438,12 @@ void add_align(CLI::App& app, Run& run) {
   command->add_option(
       "--scan", options->scan,
       "Scan: a PLY file or the folder of limn scan; without it the pose is computed from the markers alone");
-  command->add_option("--scan-units", options->scan_units, "Unit of the PLY file: m, cm, mm, in or ft")
-      ->capture_default_str();
+  add_choice(command, "--scan-units", &options->scan_units, scene::k_length_units,
+             "Unit of the PLY file: m, cm, mm, in or ft");
   command->add_option("--mesh", options->mesh,
                       "CAD mesh: .glb, .gltf, .obj, .stl or .ply; without it the scene's prototype");
-  command->add_option("--units", options->units, "Unit of the CAD mesh: m, cm, mm, in or ft");
+  add_choice(command, "--units", &options->units, scene::k_length_units,
+             "Unit of the CAD mesh: m, cm, mm, in or ft");
   command->add_option("--start", options->start, "POSES.json with world_from_prototype, the initial pose");
   command->add_option("--points", options->points,
                       "PICKS.json: three or more pairs of corresponding points on CAD and scan");

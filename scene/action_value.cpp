@@ -71,8 +71,11 @@ Result<ScreenChoice> read_screen(const Edit& edit) {
 // A part's name may contain spaces: the unit is the last word.
 Result<PartUnit> read_part_unit(const Edit& edit) {
   const auto blank = edit.value.rfind(' ');
-  return PartUnit{edit.value, edit.value.substr(0, blank),
-                  blank == std::string::npos ? "" : edit.value.substr(blank + 1)};
+  const std::string word = blank == std::string::npos ? "" : edit.value.substr(blank + 1);
+  const auto unit = k_length_units.find(word);
+  if (!unit)
+    return error("{}: expected m, cm, mm, in or ft after the part's name, found '{}'.", edit.action, word);
+  return PartUnit{edit.value, edit.value.substr(0, blank), *unit};
 }
 
 Result<std::optional<MarkerName>> read_marker(const Edit& edit) {

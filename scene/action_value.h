@@ -9,6 +9,7 @@
 #include "core/pose.h"
 #include "core/result.h"
 #include "scene/material_override.h"
+#include "scene/mesh.h"
 #include "scene/room_light.h"
 #include "scene/show_state.h"
 
@@ -44,7 +45,8 @@ struct ScreenChoice {
 /// The unit of length of a part whose file was put into a slot's folder.
 struct PartUnit {
   std::string words;  ///< The whole text as it was written.
-  std::string part, unit;
+  std::string part;
+  LengthUnit unit = LengthUnit::metre;
 };
 
 /// An action's value after reading; the action determines its type.

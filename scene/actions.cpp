@@ -100,9 +100,6 @@ Status set_unit(Change* change, const PartUnit& wanted) {
   if (std::find(dropped.begin(), dropped.end(), wanted.part) == dropped.end())
     return error("{}: expected a part that was dropped into slot '{}' ({}) and its unit, found '{}'.",
                  change->name, change->slot().name, listed(dropped), wanted.words);
-  if (!metres_per_unit(wanted.unit))
-    return error("{}: expected m, cm, mm, in or ft after the part's name, found '{}'.", change->name,
-                 wanted.unit);
   return {};
 }
 

@@ -7,46 +7,13 @@
 #include <string_view>
 
 #include "core/result.h"
+#include "scene/action_id.h"
 #include "scene/action_value.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 
 namespace limn::scene {
-
-/// Everything that people and programs can do in a session. Each action has a row in the table in
-/// actions.cpp, in this order; a missing row is a compiler error.
-enum class ActionId {
-  next_variant,
-  previous_variant,
-  choose_variant,
-  nudge,
-  place,
-  release,
-  pair,
-  unpair,
-  units,
-  material,
-  save_look,
-  restore_look,
-  next_look,
-  previous_look,
-  flip,
-  split,
-  split_at,
-  delete_look,
-  undelete_look,
-  repair,
-  light,
-  blackout,
-  freeze,
-  grid,
-  marker_states,
-  screen,
-  viewer,
-  count  ///< The number of actions; not an action.
-};
-constexpr auto k_action_count = static_cast<std::size_t>(ActionId::count);
 
 /// What a guest of the remote may do. Each role includes the roles before it (docs/remote.md).
 enum class Role { look, work, operate };

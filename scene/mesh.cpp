@@ -11,7 +11,6 @@
 #include <assimp/LogStream.hpp>
 #include <cctype>
 #include <cmath>
-#include <map>
 
 #include "core/log.h"
 #include "scene/read_materials.h"
@@ -272,21 +271,23 @@ class Complaints {
 
 }  // namespace
 
-Result<double> metres_per_unit(const std::string& units) {
-  static const std::map<std::string, double> k_units = {
-      {"m", 1}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}};
-  const auto found = k_units.find(units);
-  if (found == k_units.end()) {
-    return error(
-        "expected a unit of length (m, cm, mm, in or ft), found '{}'. Say in which unit the mesh was drawn.",
-        units);
+double metres_per_unit(LengthUnit units) {
+  switch (units) {
+    case LengthUnit::metre:
+      return 1;
+    case LengthUnit::centimetre:
+      return 0.01;
+    case LengthUnit::millimetre:
+      return 0.001;
+    case LengthUnit::inch:
+      return 0.0254;
+    case LengthUnit::foot:
+      break;
   }
-  return found->second;
+  return 0.3048;
 }
 
-Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
-  const auto metres = metres_per_unit(units);
-  if (!metres) return error("{}: {}", path.string(), metres.message());
+Result<Mesh> load_mesh(const fs::path& path, LengthUnit units) {
   LIMN_TRY_STATUS(known_format(path));
   if (std::error_code code; !fs::is_regular_file(path, code)) {
     return error("{}: expected a mesh file, found no file. Check the name.", path.string());
@@ -313,7 +314,8 @@ Result<Mesh> load_mesh(const fs::path& path, const std::string& units) {
   }
   if (!scene->mRootNode) return no_triangles(path);
   Soup soup;
-  append(*scene, *scene->mRootNode, Eigen::Matrix4f::Identity(), static_cast<float>(*metres), &soup);
+  append(*scene, *scene->mRootNode, Eigen::Matrix4f::Identity(), static_cast<float>(metres_per_unit(units)),
+         &soup);
   if (soup.triangle_materials.empty()) return no_triangles(path);
   LIMN_TRY_STATUS(checked(soup, path));
   if (extension(path) == ".stl") drop_normals(&soup);

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/result.h"
 #include "scene/material.h"
 
@@ -25,12 +26,15 @@ struct Mesh {
   std::vector<Material> materials = {Material{}};
 };
 
-/// Metres per unit of length (m, cm, mm, in, ft). Error for any other word.
-Result<double> metres_per_unit(const std::string& units);
+/// The unit of a mesh's coordinates.
+enum class LengthUnit { metre, centimetre, millimetre, inch, foot };
+inline constexpr EnumNames<LengthUnit, 5> k_length_units{{"m", "cm", "mm", "in", "ft"}};
+inline std::string to_text(LengthUnit unit) { return k_length_units.text(unit); }
+double metres_per_unit(LengthUnit units);
 
 /// Reads a glb, gltf, obj, stl or ply file and scales it by metres_per_unit(units). Missing normals are
 /// computed; equal vertices are merged. Errors: unreadable or truncated file, no triangles, NaN or infinite
-/// coordinates, unknown units.
-Result<Mesh> load_mesh(const std::filesystem::path& path, const std::string& units);
+/// coordinates.
+Result<Mesh> load_mesh(const std::filesystem::path& path, LengthUnit units);
 
 }  // namespace limn::scene

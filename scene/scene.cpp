@@ -12,6 +12,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "scene/actions.h"
 #include "scene/marker_file.h"
 
 namespace limn::scene {
@@ -23,7 +24,7 @@ namespace fs = std::filesystem;
 struct MeshFile {
   std::string where;
   fs::path path;
-  std::string units;
+  LengthUnit units = LengthUnit::metre;
 };
 
 struct Reader {
@@ -55,7 +56,7 @@ MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
 
 MeshFile read_mesh_file(const ConfigNode& node) {
   const ConfigNode mesh = node.at("mesh");
-  return {mesh.where(), mesh.path_inside(), node.at("units").choice({"m", "cm", "mm", "in", "ft"})};
+  return {mesh.where(), mesh.path_inside(), k_length_units.read(node.at("units"))};
 }
 
 double read_size_m(const ConfigNode& node) { return node.at("size_mm").positive() * 1e-3; }
@@ -143,12 +144,19 @@ std::vector<Slot> read_slots(const ConfigNode& node, Reader* reader) {
   return slots;
 }
 
+ActionId read_action(const ConfigNode& node) {
+  const std::string name = node.text();
+  if (const Action* action = find_action(name)) return action->id;
+  node.problem(fmt::format("expected an action ({}), found '{}'.", action_names(), name));
+  return {};
+}
+
 Control read_control(const ConfigNode& node, const Scene& scene) {
   node.only({"marker", "action", "slot", "gesture"});
   Control control;
   control.marker = read_marker_name(node.at("marker"));
-  control.action = node.at("action").text();
-  if (const auto gesture = node.find("gesture")) control.gesture = gesture->text();
+  control.action = read_action(node.at("action"));
+  if (const auto gesture = node.find("gesture")) control.gesture = k_gestures.read(*gesture);
   if (const auto slot = node.find("slot")) {
     control.slot = slot->text();
     if (!scene.find_slot(control.slot)) {
@@ -232,22 +240,23 @@ std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
 }
 
 // An object much too small or large for a prototype was most likely drawn in another unit.
-Status check_size(const Mesh& mesh, const std::string& units) {
+Status check_size(const Mesh& mesh, LengthUnit units) {
   constexpr double k_smallest_m = 1e-3, k_largest_m = 20;
   constexpr double k_likely_from_m = 0.02, k_likely_to_m = 6;
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : mesh.positions) box.extend(p);
   const double size_m = box.diagonal().cast<double>().norm();
   if (size_m >= k_smallest_m && size_m <= k_largest_m) return {};
-  const double in_file = size_m / metres_per_unit(units).value();
+  const double in_file = size_m / metres_per_unit(units);
   std::vector<std::string> likely;
-  for (const char* unit : {"mm", "cm", "m", "in", "ft"}) {
-    const double as_m = in_file * metres_per_unit(unit).value();
+  for (const LengthUnit unit : {LengthUnit::millimetre, LengthUnit::centimetre, LengthUnit::metre,
+                                LengthUnit::inch, LengthUnit::foot}) {
+    const double as_m = in_file * metres_per_unit(unit);
     if (as_m >= k_likely_from_m && as_m <= k_likely_to_m)
-      likely.push_back(fmt::format("{} ({:.3g} m)", unit, as_m));
+      likely.push_back(fmt::format("{} ({:.3g} m)", to_text(unit), as_m));
   }
   return error(
-      "expected an object of 1 mm to 20 m, found {:.3g} m across in units \"{}\". {}", size_m, units,
+      "expected an object of 1 mm to 20 m, found {:.3g} m across in units \"{}\". {}", size_m, to_text(units),
       likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
@@ -285,26 +294,26 @@ double longest_side(const Mesh& mesh) {
 
 // A guess of a mesh's unit: glTF is in metres; for other formats the first unit that gives a part's usual
 // size.
-std::string guessed_units(const fs::path& path, const Mesh& as_metres) {
-  if (path.extension() == ".glb" || path.extension() == ".gltf") return "m";
+LengthUnit guessed_units(const fs::path& path, const Mesh& as_metres) {
+  if (path.extension() == ".glb" || path.extension() == ".gltf") return LengthUnit::metre;
   constexpr double k_least_m = 0.01, k_most_m = 3;
-  for (const char* units : {"mm", "cm", "m", "in"}) {
-    const double size = longest_side(as_metres) * metres_per_unit(units).value();
+  for (const LengthUnit units :
+       {LengthUnit::millimetre, LengthUnit::centimetre, LengthUnit::metre, LengthUnit::inch}) {
+    const double size = longest_side(as_metres) * metres_per_unit(units);
     if (size >= k_least_m && size <= k_most_m) return units;
   }
-  return "m";
+  return LengthUnit::metre;
 }
 
 // The units that people have given, by variant.
-Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
-  std::map<std::string, std::string> units;
+Result<std::map<std::string, LengthUnit>> load_units(const fs::path& file) {
+  std::map<std::string, LengthUnit> units;
   std::error_code none;
   if (!fs::exists(file, none)) return units;
   LIMN_TRY(const Config config, Config::load(file, "limn.units/1"));
   config.root().only({"schema", "units"});
   const ConfigNode node = config.root().at("units");
-  for (const std::string& name : node.keys())
-    units[name] = node.at(name).choice({"m", "cm", "mm", "in", "ft"});
+  for (const std::string& name : node.keys()) units[name] = k_length_units.read(node.at(name));
   LIMN_TRY_STATUS(config.status());
   return units;
 }
@@ -312,16 +321,16 @@ Result<std::map<std::string, std::string>> load_units(const fs::path& file) {
 // Imports a mesh from a slot's folder; `told` has the units that people have given, by variant.
 Result<Variant> auto_import_meshes(const fs::path& file,
                                    const Slot& slot,
-                                   const std::map<std::string, std::string>& told) {
+                                   const std::map<std::string, LengthUnit>& told) {
   const std::string name = file.stem().string();
   if (find_named(slot.variants, name))
     return error(
         "{}: expected a file name that no other variant of slot '{}' has, found '{}' twice. Rename the file.",
         file.string(), slot.name, name);
-  LIMN_TRY(const Mesh as_metres, load_mesh(file, "m"));
+  LIMN_TRY(const Mesh as_metres, load_mesh(file, LengthUnit::metre));
   const auto known = told.find(name);
   const bool is_guess = known == told.end();
-  const std::string units = is_guess ? guessed_units(file, as_metres) : known->second;
+  const LengthUnit units = is_guess ? guessed_units(file, as_metres) : known->second;
   LIMN_TRY(Mesh mesh, load_mesh(file, units));
   if (const Status size = check_size(mesh, units); !size)
     return error("{}: {}", file.string(), size.message());
@@ -430,15 +439,16 @@ std::string units_question(const Slot& slot, const Variant& variant) {
   if (!variant.auto_imported || !variant.auto_imported->is_guess) return {};
   return fmt::format(
       "{} of slot '{}' is assumed to be in {}, {:.0f} mm long. Is that right? If not: units {} {} UNIT",
-      variant.name, slot.name, variant.auto_imported->units, 1e3 * longest_side(variant.mesh), slot.name,
-      variant.name);
+      variant.name, slot.name, to_text(variant.auto_imported->units), 1e3 * longest_side(variant.mesh),
+      slot.name, variant.name);
 }
 
-std::string units_json(const Slot& slot, const std::string& variant, const std::string& units) {
+std::string units_json(const Slot& slot, const std::string& variant, LengthUnit units) {
   nlohmann::ordered_json all = nlohmann::ordered_json::object();
   for (const Variant& known : slot.variants)
-    if (known.auto_imported && !known.auto_imported->is_guess) all[known.name] = known.auto_imported->units;
-  all[variant] = units;
+    if (known.auto_imported && !known.auto_imported->is_guess)
+      all[known.name] = to_text(known.auto_imported->units);
+  all[variant] = to_text(units);
   return nlohmann::ordered_json({{"schema", "limn.units/1"}, {"units", all}}).dump(2) + "\n";
 }
 

@@ -7,9 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "core/gesture.h"
 #include "core/imager.h"
 #include "core/marker.h"
 #include "core/result.h"
+#include "scene/action_id.h"
 #include "scene/mesh.h"
 #include "scene/room_light.h"
 
@@ -31,7 +33,7 @@ enum class Mode {
 struct Variant {
   /// A mesh whose file people put into the slot's folder.
   struct AutoImported {
-    std::string units;
+    LengthUnit units = LengthUnit::metre;
     bool is_guess = true;  ///< Whether the unit is a guess, not a person's answer.
   };
   std::string name;
@@ -53,9 +55,9 @@ struct Slot {
 /// A marker that triggers an action when it is covered, turned or laid down.
 struct Control {
   MarkerName marker;
-  std::string action;
+  ActionId action = ActionId::next_variant;
   std::string slot;
-  std::string gesture;
+  Gesture gesture = Gesture::cover;
 };
 
 /// A viewer that `view` parts are drawn for: a fixed imager, a person's eye relative to a marker (on glasses,
@@ -101,7 +103,7 @@ Result<Scene> load_scene(const std::filesystem::path& path,
 /// empty for other variants.
 std::string units_question(const Slot& slot, const Variant& variant);
 /// The text of slots/NAME/units.json with one more unit.
-std::string units_json(const Slot& slot, const std::string& variant, const std::string& units);
+std::string units_json(const Slot& slot, const std::string& variant, LengthUnit units);
 
 /// Reads a viewer file (docs/formats.md): {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);

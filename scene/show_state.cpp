@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "scene/actions.h"
 #include "scene/command_text.h"
 
 namespace limn::scene {
@@ -47,7 +48,7 @@ std::optional<std::string> user_of(const Scene& scene,
       if (known.marker == marker) return body.name == "prototype" ? "the prototype" : "a viewer";
   }
   for (const Control& control : scene.controls)
-    if (control.marker == marker) return "the control of " + control.action;
+    if (control.marker == marker) return "the control of " + std::string(action_of(control.action).name);
   return std::nullopt;
 }
 

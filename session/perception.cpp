@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <map>
 #include <numbers>
 
 #include "core/image_io.h"
@@ -28,17 +27,6 @@ constexpr int k_rarer = 3;
 constexpr int k_covered_every = 2;
 // If the time between images grows by more than this factor, markers are not extrapolated.
 constexpr double k_like_moments = 3;
-
-Result<tracker::Gesture> gesture_of(const scene::Control& control) {
-  static const std::map<std::string, tracker::Gesture> gestures = {{"", tracker::Gesture::cover},
-                                                                   {"cover", tracker::Gesture::cover},
-                                                                   {"turn", tracker::Gesture::turn},
-                                                                   {"lay", tracker::Gesture::lay}};
-  const auto found = gestures.find(control.gesture);
-  if (found != gestures.end()) return found->second;
-  return error("scene.json: controls: {}: expected the gesture cover, turn or lay, found '{}'.",
-               control.marker.text(), control.gesture);
-}
 
 // Whether a marker has moved by more than its corners' noise.
 bool has_moved(const tracker::Detection& now, const tracker::Detection& before) {
@@ -99,8 +87,7 @@ Result<Perception> Perception::create(const scene::Scene& scene,
            tracker::Families::load(families_of(scene, out.bodies_), scene.folder));
   std::vector<tracker::GestureReader> gestures;
   for (const scene::Control& control : scene.controls) {
-    LIMN_TRY(const tracker::Gesture gesture, gesture_of(control));
-    gestures.emplace_back(control.marker, gesture);
+    gestures.emplace_back(control.marker, control.gesture);
   }
   for (const Imager& camera : rig.cameras)
     out.eyes_.push_back({tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures});

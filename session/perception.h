@@ -65,7 +65,7 @@ double loose_size_m(const scene::Scene& scene);
 /// only clock is the frames' stamps, so the same frames give the same results.
 class Perception {
  public:
-  /// Error: a family that cannot be loaded, a control whose gesture is unknown.
+  /// Error: a family that cannot be loaded.
   static Result<Perception> create(const scene::Scene& scene,
                                    const Rig& rig,
                                    const PerceptionOptions& options = {});

@@ -13,9 +13,8 @@ namespace fs = std::filesystem;
 
 // A turn backwards triggers the opposite of the control's action, if there is one.
 scene::Edit edit_of(const scene::Control& control, int steps) {
-  const scene::Action* action = scene::find_action(control.action);
-  LIMN_CHECK(action != nullptr);  // Session::create() has checked it
-  return scene::make_edit(steps > 0 ? action->id : action->opposite.value_or(action->id), control.slot);
+  const scene::ActionId backwards = scene::action_of(control.action).opposite.value_or(control.action);
+  return scene::make_edit(steps > 0 ? control.action : backwards, control.slot);
 }
 
 std::vector<std::string> variant_names(const scene::Slot& slot) {
@@ -39,8 +38,8 @@ bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
       text += "\n";
     }
     for (const scene::Control& control : scene.controls)
-      text +=
-          fmt::format("{} {} {} {}\n", control.marker.text(), control.action, control.slot, control.gesture);
+      text += fmt::format("{} {} {} {}\n", control.marker.text(), scene::action_of(control.action).name,
+                          control.slot, k_gestures.text(control.gesture));
     return text;
   };
   return carriers(a) == carriers(b);
@@ -61,13 +60,10 @@ Result<Session> Session::create(const SessionSetup& setup,
                                 Recorder* recorder,
                                 bool keeps_looks) {
   for (const scene::Control& control : setup.scene.controls) {
-    const scene::Action* action = scene::find_action(control.action);
-    if (!action)
-      return error("scene.json: controls: {}: expected an action ({}), found '{}'.", control.marker.text(),
-                   scene::action_names(), control.action);
-    if (action->of_slot && control.slot.empty())
+    const scene::Action& action = scene::action_of(control.action);
+    if (action.of_slot && control.slot.empty())
       return error("scene.json: controls: {}: expected a slot for {}, found none.", control.marker.text(),
-                   control.action);
+                   action.name);
   }
   LIMN_TRY(FrameComposer composer, FrameComposer::create(setup.scene, setup.rig, setup.paint));
   Session out(setup, std::move(composer), telemetry, recorder, keeps_looks);

@@ -9,16 +9,10 @@
 #include <vector>
 
 #include "core/frame.h"
+#include "core/gesture.h"
 #include "tracker/detection.h"
 
 namespace limn::tracker {
-
-/// What a person does with a control marker.
-enum class Gesture {
-  cover,  ///< a hand rests on it
-  turn,   ///< it is turned about its own axis, step by step; clockwise is forwards
-  lay     ///< it is tipped over, or out of sight
-};
 
 struct GestureOptions {
   double cover_s = 0.5;   ///< a cover must last this long; with less, hands that pass trigger the action

@@ -153,6 +153,10 @@ TEST_F(CommandLine, WordsOutsideAClosedSetAreWrongUsageAndListTheSet) {
                                               path("scene"), "--poses",   path("poses.json")};
   expect(with(exporting, "--format", "tiff"), 2, {"--format", "pfm"});
   expect(with(exporting, "--profile", "2d"), 2, {"--profile", "a3"});
+  const std::vector<std::string> align = {"align",       "--scan", path("s.ply"), "--mesh",
+                                          path("m.stl"), "--out",  path("out")};
+  expect(with(align, "--units", "parsec"), 2, {"--units", "parsec", "mm"});
+  expect(with(align, "--scan-units", "parsec"), 2, {"--scan-units", "parsec", "mm"});
 }
 
 TEST_F(CommandLine, MissingAndTruncatedImagesAreNamed) {

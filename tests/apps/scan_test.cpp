@@ -109,7 +109,7 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   AlignCommand align;
   align.scan = out / "scan";
   align.mesh = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door/door.glb";
-  align.units = "m";
+  align.units = scene::LengthUnit::metre;
   align.start = out / "start.json";
   align.out = out / "aligned";
   const Status laid = run_align(align);
@@ -166,7 +166,7 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   align.frames.clear();
 
   align.start.clear();
-  align.units = "mm";
+  align.units = scene::LengthUnit::millimetre;
   align.out = out / "wrong";
   const Status wrong = run_align(align);
   ASSERT_FALSE(wrong.ok());
@@ -253,13 +253,13 @@ TEST(Scan, CallsWrongOptionsWrongUsage) {
 TEST(Align, CallsWrongOptionsWrongUsage) {
   AlignCommand command;
   command.mesh = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door/door.glb";
-  command.units = "m";
+  command.units = scene::LengthUnit::metre;
   command.out = test::test_folder() / "out";
   EXPECT_TRUE(run_align(command).error().wrong_usage);  // neither a scan nor markers
   command.scan = "scan.ply";
-  command.units = "parsec";
+  command.units.reset();
   EXPECT_TRUE(run_align(command).error().wrong_usage);
-  command.units = "m";
+  command.units = scene::LengthUnit::metre;
   command.start = "a.json";
   command.points = "b.json";
   EXPECT_TRUE(run_align(command).error().wrong_usage);

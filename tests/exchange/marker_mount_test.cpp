@@ -139,7 +139,7 @@ TEST_P(Sizes, HoldsTheMarkerWhereItSaysAndInSight) {
 
 TEST(MarkerMount, IsReadBackAsAMesh) {
   const Printed mount = printed(40);
-  const auto mesh = scene::load_mesh(mount.stl, "mm");
+  const auto mesh = scene::load_mesh(mount.stl, scene::LengthUnit::millimetre);
   ASSERT_TRUE(mesh) << mesh.message();
   EXPECT_EQ(mesh->triangles.size(), mount.triangles.size());
   Eigen::Vector3f least = mesh->positions[0], most = least;

@@ -23,7 +23,7 @@ Scene a_scene() {
     for (const char* variant : {"a", "b", "c"}) slot.variants.push_back({variant, {}});
     scene.slots.push_back(slot);
   }
-  scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{"m"}});
+  scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{LengthUnit::metre}});
   return scene;
 }
 
@@ -252,7 +252,7 @@ TEST(Actions, WhatTheSessionDoesIsReadAndRefusedInTime) {
   const auto unit = command_of(scene, make_edit(ActionId::units, "mirror", "new one mm"));
   ASSERT_TRUE(unit) << unit.message();
   EXPECT_EQ(std::get<PartUnit>(unit->value).part, "new one");
-  EXPECT_EQ(std::get<PartUnit>(unit->value).unit, "mm");
+  EXPECT_EQ(std::get<PartUnit>(unit->value).unit, LengthUnit::millimetre);
   ShowState dark = a_staging(scene);
   dark.blackout = true;
   EXPECT_FALSE(apply_edit(scene, dark, {}, make_edit(ActionId::repair)));

@@ -75,7 +75,8 @@ TEST(Scene, EveryKeyIsRead) {
   EXPECT_NEAR(mirror->variants[1].mesh.positions[2].x(), 0.02, 1e-8);
   EXPECT_EQ(scene->find_slot("trim")->mode, Mode::surface);
   EXPECT_FALSE(scene->find_slot("grille"));
-  EXPECT_EQ(scene->controls[0].gesture, "cover");
+  EXPECT_EQ(scene->controls[0].action, ActionId::next_variant);
+  EXPECT_EQ(scene->controls[0].gesture, Gesture::cover);
   ASSERT_TRUE(scene->viewers.size() == 1 && scene->viewers[0].fixed);
   EXPECT_EQ(scene->viewers[0].fixed->width, 640);
   const auto found = bodies(*scene);
@@ -226,6 +227,8 @@ TEST(Scene, MistakesAreErrorsWithTheirPath) {
       {R"([{"op":"replace","path":"/slots/0/marker_from_part/rotation_wxyz","value":[2,0,0,0]}])",
        "marker_from_part"},
       {R"([{"op":"replace","path":"/controls/0/slot","value":"grille"}])", "controls[0].slot"},
+      {R"([{"op":"replace","path":"/controls/0/action","value":"dance"}])", "controls[0].action"},
+      {R"([{"op":"replace","path":"/controls/0/gesture","value":"wave"}])", "controls[0].gesture"},
       {R"([{"op":"add","path":"/viewer/marker","value":"aruco_4x4_50:8"}])", "viewer"},
       {R"([{"op":"add","path":"/viewer/tablet","value":true}])", "viewer"},
       {R"([{"op":"replace","path":"/viewer","value":{"tablet":false}}])", "viewer.tablet"},

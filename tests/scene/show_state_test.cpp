@@ -87,6 +87,8 @@ TEST(ShowState, WhatCannotBeDoneIsNamedAndChangesNothing) {
             "the scene's families (aruco_4x4_50), found aruco_5x5_50:9"},
            {{"pair", "mirror", "aruco_4x4_50:1"}, "found aruco_4x4_50:1, which slot 'trim' uses"},
            {{"units", "mirror", "a mm"}, "was dropped into slot 'mirror' (none)"},
+           {{"units", "mirror", "a mile"},
+            "expected m, cm, mm, in or ft after the part's name, found 'mile'"},
            {{"flip", "", ""}, "two looks shown before, found none"},
            {{"flip", "", "x"}, "flip: expected one of none, found 'x'"},
            {{"split", "", ""}, "expected a look shown before"},

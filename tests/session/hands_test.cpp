@@ -44,9 +44,9 @@ class Table {
     draw();
 
     scene::Scene scene;
-    const std::array gestures = {"cover", "turn", "lay"};
+    const std::array gestures = {Gesture::cover, Gesture::turn, Gesture::lay};
     for (std::size_t i = 0; i < controls_.size(); ++i)
-      scene.controls.push_back({marker(i), "next_variant", "mirror", gestures[i]});
+      scene.controls.push_back({marker(i), scene::ActionId::next_variant, "mirror", gestures[i]});
     Rig rig;
     rig.cameras.push_back({"camera0", k_side, k_side, lens_, {}});
     perception_ = Perception::create(scene, rig).value();

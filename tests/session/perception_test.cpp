@@ -83,7 +83,7 @@ TEST(Perception, PredictionMakesUpForTheLag) {
 TEST(Perception, LooksForCoveredMarkersWhileOneIsMissing) {
   sim::World world = studio(1);
   const MarkerName control = MarkerName::parse("apriltag_36h11:9").value();
-  world.scene->controls = {{control, "next_variant", "mirror", "cover"}};
+  world.scene->controls = {{control, scene::ActionId::next_variant, "mirror", Gesture::cover}};
   const Pose lying(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45});
   ASSERT_TRUE(sim::add_marker(world, {control, 0.05, lying}, false, marker_image));
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
@@ -143,7 +143,8 @@ TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
 
 TEST(Perception, ReadsWhatControlMarkersSay) {
   sim::World world = studio(0.5);
-  world.scene->controls = {{MarkerName::parse("aruco_4x4_50:9").value(), "next_variant", "mirror", "cover"}};
+  world.scene->controls = {
+      {MarkerName::parse("aruco_4x4_50:9").value(), scene::ActionId::next_variant, "mirror", Gesture::cover}};
   ASSERT_TRUE(
       sim::add_marker(world,
                       {world.scene->controls[0].marker, 0.05,

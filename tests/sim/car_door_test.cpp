@@ -37,7 +37,8 @@ TEST(CarDoor, TheCommittedFilesAreWhatTheGeneratorMakes) {
     const fs::path committed = k_config / "scenes" / "door" / name;
     ASSERT_TRUE(fs::exists(committed)) << name;
     if (committed.extension() != ".glb") continue;
-    const auto found = scene::load_mesh(committed, "m"), expected = scene::load_mesh(made / name, "m");
+    const auto found = scene::load_mesh(committed, scene::LengthUnit::metre),
+               expected = scene::load_mesh(made / name, scene::LengthUnit::metre);
     ASSERT_TRUE(found && expected) << name;
     SCOPED_TRACE("after a change run limn_write_door config/scenes/door and commit");
     expect_same_mesh(*found, *expected, name);

@@ -23,8 +23,8 @@ TEST(FinishPanel, TheCommittedFilesAreWhatTheGeneratorMakes) {
     SCOPED_TRACE(name + ": after a change run limn_write_finishes config/scenes/finishes and commit");
     EXPECT_LT(content.size(), 100000U);
     ASSERT_TRUE(write_file(made / name, content));
-    const auto found = scene::load_mesh(k_finishes / name, "m"),
-               expected = scene::load_mesh(made / name, "m");
+    const auto found = scene::load_mesh(k_finishes / name, scene::LengthUnit::metre),
+               expected = scene::load_mesh(made / name, scene::LengthUnit::metre);
     ASSERT_TRUE(found && expected);
     ASSERT_EQ(found->positions.size(), expected->positions.size());
     for (std::size_t i = 0; i < found->positions.size(); ++i)

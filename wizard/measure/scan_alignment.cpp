@@ -141,7 +141,7 @@ Status checked(const AlignOptions& command) {
         "expected a CAD file (--mesh and --units) or a --scene with a prototype, found neither.");
   if (!command.body.empty() && (command.rig.empty() || command.frames.empty() || command.scan.empty()))
     return usage_error("--body: expected --scan, --rig and --frame CAMERA=PICTURE with it.");
-  if (!command.mesh.empty() && command.units.empty())
+  if (!command.mesh.empty() && !command.units)
     return usage_error("--units: expected m, cm, mm, in or ft of the CAD, found none.");
   const int starts = !command.start.empty() + !command.points.empty() + starts_from_markers(command);
   if (starts > 1) return usage_error("expected one of --start, --points, --scene, found {}.", starts);
@@ -286,7 +286,7 @@ Result<MeshAligned> written_markers_pose(const Start& start, const AlignOptions&
 
 // The mesh to align with the scan: the CAD file, or the scene's prototype.
 Result<scene::Mesh> mesh_of(const AlignOptions& command) {
-  if (!command.mesh.empty()) return scene::load_mesh(command.mesh, command.units);
+  if (!command.mesh.empty()) return scene::load_mesh(command.mesh, *command.units);
   LIMN_TRY(scene::Scene scene, scene::load_scene(command.scene));
   if (!scene.prototype) return error("{}: expected a prototype, found none.", command.scene.string());
   return std::move(scene.prototype->mesh);
@@ -297,15 +297,12 @@ Result<scene::Mesh> mesh_of(const AlignOptions& command) {
 Result<MeshAligned> written_alignment(const AlignOptions& command) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY_STATUS(checked(command));
-  const auto metres = scene::metres_per_unit(command.mesh.empty() ? "m" : command.units);
-  if (!metres) return usage_error("--units: {}", metres.message());
-  const auto scan_metres = scene::metres_per_unit(command.scan_units);
-  if (!scan_metres) return usage_error("--scan-units: {}", scan_metres.message());
+  const double metres = command.mesh.empty() ? 1 : scene::metres_per_unit(*command.units);
   LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
-  LIMN_TRY(const auto start, start_of(command, *metres));
+  LIMN_TRY(const auto start, start_of(command, metres));
   if (command.scan.empty()) return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
   const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
-  LIMN_TRY(const scene::ScanSurface scan, scene::load_ply(file, *scan_metres));
+  LIMN_TRY(const scene::ScanSurface scan, scene::load_ply(file, scene::metres_per_unit(command.scan_units)));
   if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
     return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
   const scene::MeshBvh index(mesh);

@@ -1,22 +1,24 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/surface/registration.h"
 #include "core/result.h"
+#include "scene/mesh.h"
 
 namespace limn::apps {
 
 struct AlignOptions {
   std::filesystem::path scan;  ///< PLY, or the folder of limn scan; empty: the pose comes from markers
-  std::string scan_units = "m";
-  std::filesystem::path mesh;    ///< empty: the scene's prototype
-  std::string units;             ///< units of the mesh
-  std::filesystem::path start;   ///< POSES.json, or {"world_from_prototype": POSE}
-  std::filesystem::path points;  ///< limn.picks/1
-  std::filesystem::path scene;   ///< its prototype's markers in `frames` give the start
+  scene::LengthUnit scan_units = scene::LengthUnit::metre;
+  std::filesystem::path mesh;              ///< empty: the scene's prototype
+  std::optional<scene::LengthUnit> units;  ///< units of the mesh; it needs them
+  std::filesystem::path start;             ///< POSES.json, or {"world_from_prototype": POSE}
+  std::filesystem::path points;            ///< limn.picks/1
+  std::filesystem::path scene;             ///< its prototype's markers in `frames` give the start
   /// Markers anywhere on the scanned object (limn.body/1); their poses on the CAD are computed.
   std::filesystem::path body;
   std::filesystem::path rig;
