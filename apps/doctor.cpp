@@ -155,8 +155,8 @@ Result<Rate> measured(device::CameraSource& camera) {
 }
 
 std::string shown(const device::CameraSetting& setting) {
-  if (!setting.found) return fmt::format(", {} requested {:g}", setting.name, setting.asked);
-  return fmt::format(", {} {:g} (requested {:g})", setting.name, *setting.found, setting.asked);
+  if (!setting.found) return fmt::format(", {} requested {:g}", to_text(setting.name), setting.asked);
+  return fmt::format(", {} {:g} (requested {:g})", to_text(setting.name), *setting.found, setting.asked);
 }
 
 // Opens the camera, grabs frames and compares the requested settings with the reported ones.
@@ -242,7 +242,7 @@ Findings signs(const DoctorOptions& options, const Devices& devices, const Resul
     if (options.show_s <= 0)
       findings.push_back(
           {"devices", one.name, State::works,
-           fmt::format("{}: {}x{}", one.monitor, (*display)->size().width, (*display)->size().height), ""});
+           fmt::format("{}: {}x{}", to_text(one), (*display)->size().width, (*display)->size().height), ""});
     shown.push_back(std::move(*display));
   }
   if (options.show_s > 0) add(&findings, show_signs(shown, options.show_s));

@@ -7,12 +7,13 @@
 
 #include "core/frame.h"
 #include "core/result.h"
+#include "device/sensor_settings.h"
 
 namespace limn::device {
 
 /// A setting that was requested from a camera, and the result.
 struct CameraSetting {
-  std::string name;  ///< With its unit: `exposure_ms`.
+  SensorSetting name = SensorSetting::exposure_ms;
   double asked = 0;
   std::optional<double> found;  ///< The value that the device then reports; nullopt: it cannot be read.
   std::string problem;          ///< A sentence when the device did not accept the value; else empty.

@@ -50,7 +50,9 @@ device::DisplayConfig read_display(const ConfigNode& node) {
   node.only({"name", "monitor", "size", "latency_ms"});
   device::DisplayConfig display;
   display.name = node.at("name").text();
-  display.monitor = node.at("monitor").text();
+  const std::string monitor = node.at("monitor").text();
+  display.kind = device::k_display_kinds.find(monitor).value_or(device::DisplayKind::monitor);
+  if (display.kind == device::DisplayKind::monitor) display.monitor = monitor;
   display.size = size_of(node);
   if (const auto latency = node.find("latency_ms")) {
     display.latency_s = latency->number() / 1000;
@@ -117,7 +119,7 @@ Result<Devices> load_devices(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < displays.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const std::string& monitor = devices.displays[i].monitor;
-      if (monitor == devices.displays[j].monitor && monitor != "offscreen" && monitor != "window")
+      if (devices.displays[i].kind == device::DisplayKind::monitor && monitor == devices.displays[j].monitor)
         displays[i].problem(fmt::format("expected a monitor of its own, found {}, which {} already has.",
                                         monitor, devices.displays[j].name));
     }

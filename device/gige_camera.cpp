@@ -88,16 +88,16 @@ Result<const Format*> chosen_format(ArvCamera* camera, bool grey) {
 }
 
 CameraSetting judged(
-    const char* name, double asked, double found, const Complaint& complaint, double low, double high) {
+    SensorSetting name, double asked, double found, const Complaint& complaint, double low, double high) {
   CameraSetting setting{name, asked, std::nullopt, ""};
   if (complaint.any()) {
-    setting.problem = fmt::format("{} is refused ({}).", name, complaint.text());
+    setting.problem = fmt::format("{} is refused ({}).", to_text(name), complaint.text());
     return setting;
   }
   setting.found = found;
   if (std::abs(found - asked) > 0.01 * std::max(std::abs(asked), 1.0))
-    setting.problem = fmt::format("{}: asked for {:g}, the camera says {:g}. It takes {:g} to {:g}.", name,
-                                  asked, found, low, high);
+    setting.problem = fmt::format("{}: asked for {:g}, the camera says {:g}. It takes {:g} to {:g}.",
+                                  to_text(name), asked, found, low, high);
   return setting;
 }
 
@@ -108,9 +108,10 @@ CameraSetting locked_exposure(ArvCamera* camera, double asked_ms) {
   double low = 0, high = 0;
   arv_camera_get_exposure_time_bounds(camera, &low, &high, &complaint);
   arv_camera_set_exposure_time(camera, 1000 * asked_ms, &complaint);
-  if (complaint.any()) return judged("exposure_ms", asked_ms, 0, complaint, low / 1000, high / 1000);
+  if (complaint.any())
+    return judged(SensorSetting::exposure_ms, asked_ms, 0, complaint, low / 1000, high / 1000);
   const double found = arv_camera_get_exposure_time(camera, &complaint) / 1000;
-  return judged("exposure_ms", asked_ms, found, complaint, low / 1000, high / 1000);
+  return judged(SensorSetting::exposure_ms, asked_ms, found, complaint, low / 1000, high / 1000);
 }
 
 CameraSetting locked_gain(ArvCamera* camera, double asked) {
@@ -120,9 +121,9 @@ CameraSetting locked_gain(ArvCamera* camera, double asked) {
   double low = 0, high = 0;
   arv_camera_get_gain_bounds(camera, &low, &high, &complaint);
   arv_camera_set_gain(camera, asked, &complaint);
-  if (complaint.any()) return judged("gain", asked, 0, complaint, low, high);
+  if (complaint.any()) return judged(SensorSetting::gain, asked, 0, complaint, low, high);
   const double found = arv_camera_get_gain(camera, &complaint);
-  return judged("gain", asked, found, complaint, low, high);
+  return judged(SensorSetting::gain, asked, found, complaint, low, high);
 }
 
 std::vector<CameraSetting> locked(ArvCamera* camera, const SensorSettings& wanted) {
@@ -131,7 +132,7 @@ std::vector<CameraSetting> locked(ArvCamera* camera, const SensorSettings& wante
   if (wanted.gain) settings.push_back(locked_gain(camera, *wanted.gain));
   if (wanted.white_balance_k)
     settings.push_back(
-        {"white_balance_k", *wanted.white_balance_k, std::nullopt,
+        {SensorSetting::white_balance_k, *wanted.white_balance_k, std::nullopt,
          "white_balance_k is a setting that GigE Vision cameras do not have: remove the key."});
   return settings;
 }
@@ -293,7 +294,7 @@ ArvBuffer* GigeCamera::Impl::newest(Stamp deadline) {
 std::optional<Frame> GigeCamera::Impl::grabbed(ArvBuffer* buffer) {
   double half_exposure_s = 0;
   for (const CameraSetting& setting : session->settings)
-    if (setting.name == "exposure_ms" && setting.found) half_exposure_s = *setting.found / 2000;
+    if (setting.name == SensorSetting::exposure_ms && setting.found) half_exposure_s = *setting.found / 2000;
   auto image = decoded(buffer, *session->format, session->size, options.grey);
   const Stamp captured_at = shifted(arrival(buffer), -half_exposure_s);
   arv_stream_push_buffer(session->stream.get(), buffer);

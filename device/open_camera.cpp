@@ -45,10 +45,12 @@ Opened open_path(const CameraConfig& config) {
 // Error if settings are configured for a source that has none.
 Status without_settings(const CameraConfig& config) {
   const SensorSettings& sensor = config.sensor;
-  const char* key = sensor.exposure_ms ? "exposure_ms" : sensor.gain ? "gain" : "white_balance_k";
+  const SensorSetting key = sensor.exposure_ms ? SensorSetting::exposure_ms
+                            : sensor.gain      ? SensorSetting::gain
+                                               : SensorSetting::white_balance_k;
   if (!sensor.exposure_ms && !sensor.gain && !sensor.white_balance_k) return {};
   return error("{}: {} cannot be set by Limn for {}. Set it on the camera itself and remove the key.",
-               config.name, key, config.source);
+               config.name, to_text(key), config.source);
 }
 
 Opened opened(const CameraConfig& config) {

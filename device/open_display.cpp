@@ -44,19 +44,22 @@ Opened open_window(const DisplayConfig& config, const Desktop& desktop) {
 
 }  // namespace
 
-bool needs_desktop(const DisplayConfig& config) { return config.monitor != "offscreen"; }
+std::string to_text(const DisplayConfig& config) {
+  return config.kind == DisplayKind::monitor ? config.monitor : k_display_kinds.text(config.kind);
+}
+
+bool needs_desktop(const DisplayConfig& config) { return config.kind != DisplayKind::offscreen; }
 
 Result<std::unique_ptr<Display>> open_display(const DisplayConfig& config, const Desktop* desktop) {
-  const bool monitor = config.monitor != "offscreen" && config.monitor != "window";
-  if (!monitor && config.size.empty())
+  if (config.kind != DisplayKind::monitor && config.size.empty())
     return error("{}: expected a size for the display {}, found none. Give a size or a rig.", config.name,
-                 config.monitor);
-  if (config.monitor == "offscreen")
+                 to_text(config));
+  if (config.kind == DisplayKind::offscreen)
     return Opened(std::make_unique<OffscreenDisplay>(config.name, config.size, config.latency_s));
   if (!desktop)
     return error("{}: expected a desktop for the display {}, found none. Log in to a desktop or set DISPLAY.",
-                 config.name, config.monitor);
-  if (!monitor) return open_window(config, *desktop);
+                 config.name, to_text(config));
+  if (config.kind == DisplayKind::window) return open_window(config, *desktop);
   LIMN_TRY(MonitorDisplay display, MonitorDisplay::open(*desktop, {.name = config.name,
                                                                    .monitor = config.monitor,
                                                                    .size = config.size,

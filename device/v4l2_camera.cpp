@@ -163,17 +163,17 @@ Result<v4l2_pix_format> set_format(const Device& device, std::uint32_t pixel_for
 
 // A control that can be locked: its automatic mode is switched off, then its value is set and read back.
 struct Lock {
-  const char* name;
+  SensorSetting name;
   std::uint32_t automatism;
   int off;
   std::uint32_t value;
   double steps_per_unit;
 };
 
-constexpr Lock k_exposure = {"exposure_ms", V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL,
+constexpr Lock k_exposure = {SensorSetting::exposure_ms, V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL,
                              V4L2_CID_EXPOSURE_ABSOLUTE, 10};
-constexpr Lock k_gain = {"gain", V4L2_CID_AUTOGAIN, 0, V4L2_CID_GAIN, 1};
-constexpr Lock k_white_balance = {"white_balance_k", V4L2_CID_AUTO_WHITE_BALANCE, 0,
+constexpr Lock k_gain = {SensorSetting::gain, V4L2_CID_AUTOGAIN, 0, V4L2_CID_GAIN, 1};
+constexpr Lock k_white_balance = {SensorSetting::white_balance_k, V4L2_CID_AUTO_WHITE_BALANCE, 0,
                                   V4L2_CID_WHITE_BALANCE_TEMPERATURE, 1};
 
 std::string range_of(const Device& device, const Lock& lock) {
@@ -186,23 +186,24 @@ std::string range_of(const Device& device, const Lock& lock) {
 
 CameraSetting locked(const Device& device, const Lock& lock, double asked) {
   CameraSetting setting{lock.name, asked, std::nullopt, ""};
+  const std::string name = to_text(lock.name);
   v4l2_control automatism{lock.automatism, lock.off};
   const bool has_automatism = device.ask(VIDIOC_S_CTRL, &automatism) != EINVAL;
   v4l2_control control{lock.value, static_cast<int>(std::lround(asked * lock.steps_per_unit))};
   if (const int problem = device.ask(VIDIOC_S_CTRL, &control)) {
     setting.problem =
-        fmt::format("{} is refused ({}). {}", lock.name, std::strerror(problem), range_of(device, lock));
+        fmt::format("{} is refused ({}). {}", name, std::strerror(problem), range_of(device, lock));
     return setting;
   }
   if (device.ask(VIDIOC_G_CTRL, &control) == 0) setting.found = control.value / lock.steps_per_unit;
   const double half_step = 0.5001 / lock.steps_per_unit;
   if (!setting.found) {
-    setting.problem = fmt::format("{} cannot be read back.", lock.name);
+    setting.problem = fmt::format("{} cannot be read back.", name);
   } else if (std::abs(*setting.found - asked) > half_step) {
-    setting.problem = fmt::format("{}: asked for {:g}, the driver says {:g}. {}", lock.name, asked,
-                                  *setting.found, range_of(device, lock));
+    setting.problem = fmt::format("{}: asked for {:g}, the driver says {:g}. {}", name, asked, *setting.found,
+                                  range_of(device, lock));
   } else if (has_automatism && device.ask(VIDIOC_G_CTRL, &automatism) == 0 && automatism.value != lock.off) {
-    setting.problem = fmt::format("{}: the camera's own control of it stays on.", lock.name);
+    setting.problem = fmt::format("{}: the camera's own control of it stays on.", name);
   }
   return setting;
 }
@@ -437,7 +438,7 @@ Stamp V4l2Camera::Impl::stamp_of(const v4l2_buffer& buffer) {
   last_stamp = stamp;
   double half_exposure_s = 0;
   for (const CameraSetting& setting : session->settings)
-    if (setting.name == k_exposure.name && setting.found) half_exposure_s = *setting.found / 2000;
+    if (setting.name == SensorSetting::exposure_ms && setting.found) half_exposure_s = *setting.found / 2000;
   const bool at_start = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
   return shifted(stamp, at_start ? half_exposure_s : -half_exposure_s);
 }

@@ -143,12 +143,13 @@ TEST_F(AMonitor, AndAWindowAreOpenedByName) {
   auto display = open_display({.name = "left", .monitor = first_.name}, &*desktop_);
   ASSERT_TRUE(display) << display.message();
   EXPECT_EQ((*display)->size(), first_.size);
-  auto window = open_display({.name = "screen", .monitor = "window", .size = {1920, 1080}}, &*desktop_);
+  auto window =
+      open_display({.name = "screen", .kind = DisplayKind::window, .size = {1920, 1080}}, &*desktop_);
   ASSERT_TRUE(window) << window.message();
   EXPECT_EQ((*window)->size(), cv::Size(1920, 1080));
   EXPECT_TRUE((*window)->show(quarters({1920, 1080}, 50)));
   EXPECT_FALSE((*window)->show(quarters({1920, 1000}, 50)));
-  EXPECT_FALSE(open_display({.monitor = "window"}, &*desktop_));
+  EXPECT_FALSE(open_display({.kind = DisplayKind::window}, &*desktop_));
 }
 
 TEST_F(AMonitor, OfAnotherNameOrSizeIsRefused) {

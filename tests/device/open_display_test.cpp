@@ -12,8 +12,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 TEST(OpenDisplay, OffscreenKeepsTheImageShown) {
-  const auto display =
-      open_display({.name = "left", .monitor = "offscreen", .size = {8, 6}, .latency_s = 0.5}, nullptr);
+  const auto display = open_display(
+      {.name = "left", .kind = DisplayKind::offscreen, .size = {8, 6}, .latency_s = 0.5}, nullptr);
   ASSERT_TRUE(display) << display.message();
   EXPECT_EQ((*display)->name(), "left");
   EXPECT_EQ((*display)->size(), cv::Size(8, 6));
@@ -32,14 +32,16 @@ TEST(OpenDisplay, OffscreenKeepsTheImageShown) {
 
 TEST(OpenDisplay, WithoutADesktopOrASizeTheErrorSaysSo) {
   EXPECT_TRUE(needs_desktop({.monitor = "HDMI-1"}));
-  EXPECT_TRUE(needs_desktop({.monitor = "window"}));
-  EXPECT_FALSE(needs_desktop({.monitor = "offscreen"}));
-  for (const char* monitor : {"HDMI-1", "window"}) {
-    const auto display = open_display({.name = "left", .monitor = monitor, .size = {8, 6}}, nullptr);
+  EXPECT_TRUE(needs_desktop({.kind = DisplayKind::window}));
+  EXPECT_FALSE(needs_desktop({.kind = DisplayKind::offscreen}));
+  for (const DisplayConfig& config :
+       {DisplayConfig{.name = "left", .monitor = "HDMI-1", .size = {8, 6}},
+        DisplayConfig{.name = "left", .kind = DisplayKind::window, .size = {8, 6}}}) {
+    const auto display = open_display(config, nullptr);
     ASSERT_FALSE(display);
     EXPECT_NE(display.message().find("left: expected a desktop"), std::string::npos) << display.message();
   }
-  const auto sizeless = open_display({.name = "left", .monitor = "offscreen"}, nullptr);
+  const auto sizeless = open_display({.name = "left", .kind = DisplayKind::offscreen}, nullptr);
   ASSERT_FALSE(sizeless);
   EXPECT_NE(sizeless.message().find("left: expected a size"), std::string::npos) << sizeless.message();
 }
