@@ -67,8 +67,7 @@ OperatorView::Remote shown(const Invitation& invitation) {
   for (const scene::Role role : {scene::Role::look, scene::Role::work, scene::Role::operate}) {
     cv::Mat code = qr_code(invitation.url_for(role));
     if (!code.empty()) cv::resize(code, code, {}, k_module_px, k_module_px, cv::INTER_NEAREST);
-    out.entrances.push_back(
-        {name_of(role), invitation.pins[static_cast<std::size_t>(role)], std::move(code)});
+    out.entrances.push_back({role, invitation.pins[static_cast<std::size_t>(role)], std::move(code)});
   }
   return out;
 }
@@ -113,9 +112,7 @@ bool OperatorConsole::serve(
   OperatorAsked asked;
   window_.draw([&](Gui& gui) { asked = panel_.draw(gui, view); });
   for (const scene::Edit& wanted : asked.edits) edit(wanted, "operator");
-  if (asked.code && remote_link_)
-    for (const scene::Role role : {scene::Role::look, scene::Role::work, scene::Role::operate})
-      if (scene::name_of(role) == asked.code->role) remote_link_->show_code(asked.code->projector, role);
+  if (asked.code && remote_link_) remote_link_->show_code(asked.code->projector, asked.code->role);
   return !asked.ends && window_.is_wanted();
 }
 

@@ -348,7 +348,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   const ImVec2 at = ImGui::GetCursorPos(), corner = ImGui::GetCursorScreenPos();
   const float gap = 1.5F * gui.em(), column = 20 * gui.em();
   const float side = std::max(1.0F, std::min(size.y, size.x - column - gap));
-  if (!chosen.code.empty()) gui.image("code of " + chosen.role, chosen.code, corner, {side, side});
+  if (!chosen.code.empty()) gui.image("code of " + name_of(chosen.role), chosen.code, corner, {side, side});
   ImGui::SetCursorPos({at.x + side + gap, at.y});
   ImGui::BeginChild("remote", {size.x - side - gap, size.y}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
   heading(gui, "Remote");
@@ -358,7 +358,7 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   ImGui::TextDisabled("The code pairs with the highlighted role.");
   ImGui::Dummy({0, 0.4F * gui.em()});
   for (std::size_t i = 0; i < remote.entrances.size(); ++i)
-    if (toggle(fmt::format("{}   {}", remote.entrances[i].pin, remote.entrances[i].role),
+    if (toggle(fmt::format("{}   {}", remote.entrances[i].pin, name_of(remote.entrances[i].role)),
                &remote.entrances[i] == &chosen, colour::k_blue, {12 * gui.em(), 1.9F * gui.em()}))
       entrance_ = i;
   if (!view.projectors.empty()) {

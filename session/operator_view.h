@@ -49,7 +49,8 @@ struct OperatorView {
   /// How guests connect (docs/remote.md).
   struct Remote {
     struct Entrance {
-      std::string role, pin;
+      scene::Role role = scene::Role::look;
+      std::string pin;
       cv::Mat code;  ///< QR code of the page that pairs without typing
     };
     std::string url;
@@ -79,7 +80,8 @@ struct OperatorView {
 /// What the operator requests.
 struct OperatorAsked {
   struct Code {
-    std::string projector, role;
+    std::string projector;
+    scene::Role role = scene::Role::look;
   };
   std::vector<scene::Edit> edits;
   std::optional<Code> code = {};  ///< a code that a projector shall show

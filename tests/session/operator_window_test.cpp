@@ -245,7 +245,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
     canvas.click({800, static_cast<float>(y)}, [&](Gui& gui) {
       const OperatorAsked now = panel.draw(gui, view);
       for (const scene::Edit& edit : now.edits) asked.insert(edit.action + " " + edit.value);
-      if (now.code) asked.insert("code " + now.code->role + " " + now.code->projector);
+      if (now.code) asked.insert("code " + name_of(now.code->role) + " " + now.code->projector);
     });
   EXPECT_TRUE(asked.contains("viewer ")) << "the scene's own viewer";
   EXPECT_TRUE(asked.contains("viewer Ann"));
