@@ -6,9 +6,11 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
+#include <optional>
 #include <sstream>
 #include <string>
 
+#include "core/enum_names.h"
 #include "core/file.h"
 
 namespace limn::scene {
@@ -61,8 +63,11 @@ struct Element {
   std::size_t count = 0;
   std::vector<Property> properties;
 };
+enum class Format { ascii, little_endian, big_endian };
+constexpr EnumNames<Format, 3> k_formats{{"ascii", "binary_little_endian", "binary_big_endian"}};
 struct Header {
-  std::string format;
+  std::string format_name;
+  std::optional<Format> format;  // none: unknown
   std::vector<Element> elements;
   std::size_t bytes = 0;
 };
@@ -72,7 +77,11 @@ bool read_header_line(const std::string& line, Header* header) {
   std::istringstream words(line);
   std::string word;
   if (!(words >> word) || word == "ply" || word == "comment" || word == "obj_info") return true;
-  if (word == "format") return static_cast<bool>(words >> header->format);
+  if (word == "format") {
+    const bool is_there = static_cast<bool>(words >> header->format_name);
+    header->format = k_formats.find(header->format_name);
+    return is_there;
+  }
   if (word == "element") {
     Element element;
     if (!(words >> element.name >> element.count)) return false;
@@ -122,8 +131,8 @@ class Values {
   Values(const std::string& bytes, const Header& header)
       : bytes_(bytes),
         at_(header.bytes),
-        ascii_(header.format == "ascii"),
-        swapped_(header.format == "binary_big_endian") {}
+        ascii_(header.format == Format::ascii),
+        swapped_(header.format == Format::big_endian) {}
 
   double next(const Type& type) { return ascii_ ? next_word() : next_binary(type); }
   bool failed() const { return failed_; }
@@ -279,9 +288,8 @@ Result<ScanSurface> load_ply(const std::filesystem::path& path, double metres_pe
   LIMN_TRY(const std::string bytes, read_file(path));
   const std::string where = path.string();
   LIMN_TRY(const Header header, read_header(bytes, where));
-  if (header.format != "ascii" && header.format != "binary_little_endian" &&
-      header.format != "binary_big_endian")
-    return error("{}: expected PLY format ascii or binary, found '{}'.", where, header.format);
+  if (!header.format)
+    return error("{}: expected PLY format ascii or binary, found '{}'.", where, header.format_name);
   ScanSurface surface;
   Values values(bytes, header);
   for (const Element& element : header.elements) {
