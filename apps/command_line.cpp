@@ -281,7 +281,8 @@ void add_solve(CLI::App& app, Run& run) {
       ->allow_extra_args(false);
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print report.json instead of a table");
-  command->add_option("--import", options->import_format, "Read captures of another program: opencv-gray");
+  add_choice(command, "--import", &options->import_format, k_import_formats,
+             "Read captures of another program: opencv-gray");
   command->add_option("--projector", options->projector,
                       "With --import: size of the projector in pixels, such as 1024x768");
   command->add_option("--board", options->board,

@@ -31,7 +31,7 @@ constexpr double k_max_held_out_px = 0.20;
 
 SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {
   SolveCommandOptions options{.captures = data, .out = out};
-  options.import_format = "opencv-gray";
+  options.import_format = ImportFormat::opencv_gray;
   options.projector = "1024x768";
   options.board = "chessboard:9x7:75mm";
   options.poses = "capture_*";

@@ -38,7 +38,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   limn::apps::SolveCommandOptions options{.captures = argv[1], .out = argv[2]};
-  options.import_format = "opencv-gray";
+  options.import_format = limn::apps::ImportFormat::opencv_gray;
   options.projector = "1024x768";
   options.board = "chessboard:9x7:75mm";
   options.poses = "capture_*";

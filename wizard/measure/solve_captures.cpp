@@ -34,11 +34,9 @@ double seconds_since(Clock::time_point begun) {
 }
 
 Result<calib::CaptureSet> foreign_captures(const SolveCommandOptions& options) {
-  if (options.import_format != "opencv-gray")
-    return usage_error("--import: expected opencv-gray, found '{}'.", options.import_format);
   if (options.projector.empty() || options.board.empty())
     return usage_error("--import {}: needs --projector 1024x768 and --board chessboard:9x7:75mm.",
-                       options.import_format);
+                       k_import_formats.text(*options.import_format));
   LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
   const auto board = calib::Board::parse(options.board);
   if (!board) return usage_error("--board: {}", board.message());
@@ -47,7 +45,7 @@ Result<calib::CaptureSet> foreign_captures(const SolveCommandOptions& options) {
 }
 
 Result<calib::CaptureSet> captures_of(const SolveCommandOptions& options) {
-  if (!options.import_format.empty()) return foreign_captures(options);
+  if (options.import_format) return foreign_captures(options);
   if (!options.projector.empty() || !options.board.empty())
     return usage_error("--projector and --board describe foreign captures: they need --import opencv-gray.");
   return calib::load_captures(options.captures, options.skip_poses);

@@ -1,13 +1,19 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/report/report.h"
+#include "core/enum_names.h"
 #include "core/result.h"
 
 namespace limn::apps {
+
+/// How another program stores its captures.
+enum class ImportFormat { opencv_gray };
+inline constexpr EnumNames<ImportFormat, 1> k_import_formats{{"opencv-gray"}};
 
 struct SolveCommandOptions {
   std::filesystem::path captures;
@@ -20,8 +26,8 @@ struct SolveCommandOptions {
   /// of capture.json.
   std::vector<std::string> scale_bar_lengths = {};
 
-  /// "opencv-gray": captures of another program, which need the members below; empty: captures of Limn.
-  std::string import_format = {};
+  /// Captures of another program, which need the members below; absent: captures of Limn.
+  std::optional<ImportFormat> import_format = {};
   std::string projector = {};  ///< the projector's size, "1024x768"
   std::string board = {};      ///< "chessboard:9x7:75mm"
   std::string poses = "pose*";
