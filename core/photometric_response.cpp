@@ -72,7 +72,7 @@ CameraResponse read_camera(const ConfigNode& node) {
              "vignetting"});
   CameraResponse response;
   response.camera = node.at("name").text();
-  response.encoding = node.at("encoding").choice({"linear", "srgb", "gamma", "measured", "unknown"});
+  response.encoding = k_camera_encodings.read(node.at("encoding"));
   response.gamma = node.at("gamma").positive();
   response.gamma_stddev = node.at("gamma_stddev").number();
   response.pedestal = node.at("pedestal").number();
@@ -150,7 +150,7 @@ OrderedJson json_of(const ProjectorResponse& response) {
 
 OrderedJson json_of(const CameraResponse& response) {
   return {{"name", response.camera},
-          {"encoding", response.encoding},
+          {"encoding", k_camera_encodings.text(response.encoding)},
           {"gamma", rounded(response.gamma)},
           {"gamma_stddev", rounded(response.gamma_stddev)},
           {"pedestal", rounded(response.pedestal)},

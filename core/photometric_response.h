@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/result.h"
 
 namespace limn {
@@ -47,14 +48,23 @@ struct ProjectorResponse {
   int captures = 0;                  ///< Number of images used, over all cameras.
 };
 
+/// What describes within noise how a camera encodes light.
+enum class CameraEncoding {
+  linear,
+  srgb,      ///< IEC 61966-2-1
+  gamma,     ///< light = level^gamma
+  measured,  ///< Only the table.
+  unknown    ///< The images cannot decide; the table is then linear.
+};
+inline constexpr EnumNames<CameraEncoding, 5> k_camera_encodings{
+    {"linear", "srgb", "gamma", "measured", "unknown"}};
+
 /// How a camera turns light into 8-bit levels. The zero of light is arbitrary: only differences have a
 /// meaning.
 struct CameraResponse {
   std::string camera;
-  /// What describes the camera within noise: `linear`, `srgb` (IEC 61966-2-1), `gamma`, or `measured` (only
-  /// the table); `unknown` when the images cannot decide, then the table is linear.
-  std::string encoding = "linear";
-  double gamma = 1;  ///< light = level^gamma for `gamma`
+  CameraEncoding encoding = CameraEncoding::linear;
+  double gamma = 1;  ///< For `gamma`.
   /// Standard deviation of an additional exponent on top of the encoding: how well the images determine it.
   double gamma_stddev = 0;
   double pedestal = 0;                      ///< Level without light, for `srgb` and `gamma`.

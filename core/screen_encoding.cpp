@@ -21,7 +21,7 @@ cv::Mat srgb_image(const cv::Mat& linear) {
 
 bool is_measured_linear(const Rig& rig, const Imager& camera) {
   return std::any_of(rig.camera_responses.begin(), rig.camera_responses.end(), [&](const CameraResponse& r) {
-    return r.camera == camera.name && r.encoding == "linear";
+    return r.camera == camera.name && r.encoding == CameraEncoding::linear;
   });
 }
 

@@ -80,7 +80,7 @@ Sums sums_of(std::span<const ResponseSamples* const> samples) {
 
 // An encoding with parameters, as the light of levels.
 struct Family {
-  std::string name;
+  CameraEncoding encoding = CameraEncoding::linear;
   Values start;
   std::function<Light(const Values&)> light;
   Eigen::MatrixXd prior;  // times (parameters - start): weak prior towards 0, in standard deviations
@@ -142,10 +142,10 @@ std::vector<Family> families() {
   const auto knots = static_cast<Eigen::Index>(k_knots.size());
   const Eigen::MatrixXd pedestal = Eigen::MatrixXd::Constant(1, 1, 1 / k_pedestal_stddev);
   const Eigen::MatrixXd power = Eigen::RowVector2d(0, 1 / k_pedestal_stddev);
-  return {{"linear", none, linear_light, Eigen::MatrixXd::Zero(0, 0)},
-          {"srgb", Values::Constant(1, k_pedestal), srgb_light, pedestal},
-          {"gamma", Eigen::Vector2d(1.5, k_pedestal), power_light, power},
-          {"measured", Values::Zero(knots), free_light, smooth_prior()}};
+  return {{CameraEncoding::linear, none, linear_light, Eigen::MatrixXd::Zero(0, 0)},
+          {CameraEncoding::srgb, Values::Constant(1, k_pedestal), srgb_light, pedestal},
+          {CameraEncoding::gamma, Eigen::Vector2d(1.5, k_pedestal), power_light, power},
+          {CameraEncoding::measured, Values::Zero(knots), free_light, smooth_prior()}};
 }
 
 double light_at(const Light& light, double level) {
@@ -226,7 +226,7 @@ double power_stddev(const Sums& sums, const Light& light, double rms) {
 }
 
 struct Fit {
-  std::string name;
+  CameraEncoding encoding = CameraEncoding::linear;
   Values values;
   Light light{};
   double rms = 0;  // levels
@@ -282,7 +282,7 @@ struct FamilyProblem {
 };
 
 Fit fitted(const Sums& sums, const Family& family) {
-  Fit fit{family.name, family.start, {}, 0};
+  Fit fit{family.encoding, family.start, {}, 0};
   if (family.start.size() > 0) {
     FamilyProblem problem(sums, family);
     minimise(&problem, {.max_steps = 30,
@@ -335,7 +335,7 @@ CameraResponse unknown_encoding() {
   CameraResponse response;
   const Light light = linear_light({});
   response.light.assign(light.begin(), light.end());
-  response.encoding = "unknown";
+  response.encoding = CameraEncoding::unknown;
   return response;
 }
 
@@ -363,10 +363,10 @@ CameraResponse fitted_encoding(std::span<const ResponseSamples* const> samples) 
   response.gamma_stddev = power_stddev(sums, chosen.light, chosen.rms);
   const double of_one = response.gamma_stddev * std::sqrt(static_cast<double>(sums.levels.size()));
   if (!(best < k_worst_rms) || !(of_one < k_least_sure)) return response;
-  response.encoding = chosen.name;
+  response.encoding = chosen.encoding;
   response.light.assign(chosen.light.begin(), chosen.light.end());
-  if (chosen.name == "srgb") response.pedestal = chosen.values[0];
-  if (chosen.name == "gamma") {
+  if (chosen.encoding == CameraEncoding::srgb) response.pedestal = chosen.values[0];
+  if (chosen.encoding == CameraEncoding::gamma) {
     response.gamma = chosen.values[0];
     response.pedestal = chosen.values[1];
   }

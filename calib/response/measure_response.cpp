@@ -54,7 +54,7 @@ std::optional<CameraResponse> camera_response(const CaptureSet& captures,
   if (samples.empty()) return std::nullopt;
   CameraResponse response = fitted_encoding(samples);
   response.camera = captures.cameras[static_cast<size_t>(camera)].name;
-  if (response.encoding == "unknown")
+  if (response.encoding == CameraEncoding::unknown)
     warnings->push_back(
         fmt::format("{}: the images do not determine how it encodes light; it is taken as linear. Does the "
                     "projector scale or sharpen its image?",

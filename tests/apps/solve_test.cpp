@@ -337,7 +337,7 @@ TEST(SolveCommand, MeasuresTheResponseFromImagesBesideThePoses) {
     worst = std::max(worst, std::abs(rig->responses[0].green[static_cast<size_t>(v)] -
                                      (0.01 + 0.99 * std::pow(v / 255.0, 1.8))));
   EXPECT_LT(worst, 0.01);
-  EXPECT_EQ(rig->camera_responses.at(0).encoding, "linear");
+  EXPECT_EQ(rig->camera_responses.at(0).encoding, CameraEncoding::linear);
   EXPECT_TRUE(rig->responses[0].vignetting.has_value());
   EXPECT_TRUE(load_mixing(out / "response.json", "projector0", "camera0").ok());
 

@@ -142,7 +142,7 @@ TEST_P(ResponseOf, ProjectorAndCameraIsFoundAndForetellsOtherColours) {
   EXPECT_LT(found.black_level->stddev, 5e-4);
   EXPECT_EQ(found.captures, static_cast<int>(response_images().size()));
   const CameraResponse& seen = measured->responses.cameras.at(0);
-  EXPECT_EQ(seen.encoding, a.srgb ? "srgb" : "linear");
+  EXPECT_EQ(seen.encoding, a.srgb ? CameraEncoding::srgb : CameraEncoding::linear);
   EXPECT_LT(worst_error(seen, camera), 0.01);
   std::mt19937_64 rng = test_rng();
   double worst = 0;
@@ -156,7 +156,7 @@ TEST_P(ResponseOf, ProjectorAndCameraIsFoundAndForetellsOtherColours) {
   fmt::print(
       "{}: curve {:.4f}, black {:.5f} +- {:.5f} of {}, camera {:.4f} ({}), colours {:.2f} levels RMS\n",
       a.name, worst_error(found, projector), found.black_level->value, found.black_level->stddev,
-      a.black_level, worst_error(seen, camera), seen.encoding, worst);
+      a.black_level, worst_error(seen, camera), k_camera_encodings.text(seen.encoding), worst);
 }
 
 INSTANTIATE_TEST_SUITE_P(VirtualRig,
@@ -207,7 +207,7 @@ TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
   };
   const auto power = [](double light) { return 3 + 252 * std::pow(light, 1 / 1.6); };
   const CameraResponse gamma = encoding_of(made_samples(power));
-  EXPECT_EQ(gamma.encoding, "gamma");
+  EXPECT_EQ(gamma.encoding, CameraEncoding::gamma);
   EXPECT_NEAR(gamma.gamma, 1.6, 0.03);
   EXPECT_LT(worst(gamma, power), 0.01);
   // A knee: linear up to 0.6, then a quarter as steep.
@@ -215,7 +215,7 @@ TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
     return 10 + 300 * (light < 0.6 ? light : 0.6 + 0.25 * (light - 0.6));
   };
   const CameraResponse measured = encoding_of(made_samples(knee));
-  EXPECT_EQ(measured.encoding, "measured");
+  EXPECT_EQ(measured.encoding, CameraEncoding::measured);
   EXPECT_LT(worst(measured, knee), 0.03) << "a kink between two of the curve's knots, 26 levels apart";
   EXPECT_GT(worst(encoding_of(made_samples([](double light) { return 4 + 240 * light; })), knee), 0.1)
       << "the error if the camera were linear";
@@ -223,15 +223,16 @@ TEST(CameraResponse, PowersAndUnknownCurvesAreFound) {
 
 TEST(CameraResponse, WhatTheImagesDoNotTellIsCalledUnknown) {
   const auto linear = [](double light) { return 4 + 240 * light; };
-  EXPECT_EQ(encoding_of(made_samples(linear)).encoding, "linear");
-  EXPECT_EQ(encoding_of(made_samples(linear, 1)).encoding, "unknown") << "each pixel sees one share alone";
+  EXPECT_EQ(encoding_of(made_samples(linear)).encoding, CameraEncoding::linear);
+  EXPECT_EQ(encoding_of(made_samples(linear, 1)).encoding, CameraEncoding::unknown)
+      << "each pixel sees one share alone";
   ResponseSamples unsound = made_samples(linear);
   const size_t count = response_images().size();
   for (size_t k = 0; k < unsound.count; ++k)  // sharpened: single shares are too bright
     for (size_t i = 0; i < count; ++i)
       if (response_images()[i].role == ResponseImage::Role::share && (k + i) % 3 == 0)
         unsound.levels[k * count + i] = static_cast<uchar>(std::min(250, unsound.levels[k * count + i] + 30));
-  EXPECT_EQ(encoding_of(unsound).encoding, "unknown");
+  EXPECT_EQ(encoding_of(unsound).encoding, CameraEncoding::unknown);
 }
 
 // A small capture that tests may damage.

@@ -21,7 +21,7 @@ RigResponses some_responses() {
   projector.captures = 57;
   CameraResponse camera;
   camera.camera = "camera0";
-  camera.encoding = "gamma";
+  camera.encoding = CameraEncoding::gamma;
   camera.gamma = 2.2;
   camera.noise_dark = 0.7;
   for (int i = 0; i < 256; ++i) camera.light.push_back(std::pow(i / 255.0, 2.2));
@@ -54,7 +54,7 @@ TEST(PhotometricResponse, IsReadAsItWasWritten) {
   EXPECT_EQ(found.white_over_sum, 1.02);
   EXPECT_FALSE(found.drift.has_value());
   EXPECT_EQ(found.captures, 57);
-  EXPECT_EQ(read->cameras.at(0).encoding, "gamma");
+  EXPECT_EQ(read->cameras.at(0).encoding, CameraEncoding::gamma);
   EXPECT_NEAR(read->cameras[0].light[100], std::pow(100 / 255.0, 2.2), 1e-7);
 }
 
@@ -87,7 +87,7 @@ TEST(PhotometricResponse, ComesWithTheRigEvenWithoutARigFile) {
   const auto alone = load_rig(folder);
   ASSERT_TRUE(alone.ok()) << alone.message();
   EXPECT_EQ(alone->responses.at(0).red, some_responses().projectors[0].red);
-  EXPECT_EQ(alone->camera_responses.at(0).encoding, "gamma");
+  EXPECT_EQ(alone->camera_responses.at(0).encoding, CameraEncoding::gamma);
 }
 
 TEST(PhotometricResponse, AFallingCurveIsNamed) {
