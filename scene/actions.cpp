@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "core/names.h"
 #include "scene/command_text.h"
 #include "scene/mesh.h"
 
@@ -226,10 +227,9 @@ Status move_split(Change* change, double mm) {
 
 Status set_screen(Change* change, const ScreenChoice& choice) {
   ShowState& show_state = change->show_state;
-  const auto output = std::find_if(show_state.screens.begin(), show_state.screens.end(),
-                                   [&](const Output& known) { return known.name == choice.screen; });
+  Output* output = find_named(show_state.screens, choice.screen);
   const bool is_all = choice.screen.empty();
-  if (!is_all && output == show_state.screens.end()) {
+  if (!is_all && output == nullptr) {
     std::vector<std::string> outputs;
     for (const Output& known : show_state.screens) outputs.push_back(known.name);
     return error("{}: expected a screen of the devices file ({}), or no name for all screens, found '{}'.",
@@ -502,11 +502,7 @@ const Action& action_of(ActionId id) {
   return k_actions[static_cast<std::size_t>(id)];
 }
 
-const Action* find_action(std::string_view name) {
-  const auto found = std::find_if(k_actions.begin(), k_actions.end(),
-                                  [&](const Action& action) { return action.name == name; });
-  return found == k_actions.end() ? nullptr : &*found;
-}
+const Action* find_action(std::string_view name) { return find_named(k_actions, name); }
 
 std::string action_names() {
   std::vector<std::string> names;

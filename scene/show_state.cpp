@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "core/names.h"
 #include "scene/actions.h"
 #include "scene/command_text.h"
 
@@ -80,9 +81,7 @@ bool is_look_name(const std::string& name) {
 }
 
 const Look* find_look(const ShowState& show_state, const std::string& name) {
-  const auto look = std::find_if(show_state.looks.begin(), show_state.looks.end(),
-                                 [&](const Look& known) { return known.name == name; });
-  return look == show_state.looks.end() ? nullptr : &*look;
+  return find_named(show_state.looks, name);
 }
 
 void remember_look(const std::string& name, ShowState* show_state) {
@@ -106,9 +105,8 @@ ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) 
 }
 
 Screen screen_content(const ShowState& show_state, const std::string& screen) {
-  for (const Output& output : show_state.screens)
-    if (output.name == screen) return output.shows;
-  return show_state.screen;
+  const Output* output = find_named(show_state.screens, screen);
+  return output ? output->shows : show_state.screen;
 }
 
 const MarkerName& slot_marker(const Scene& scene, const ShowState& show_state, std::size_t slot) {

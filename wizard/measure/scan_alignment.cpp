@@ -11,6 +11,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/rig.h"
 #include "core/stopwatch.h"
 #include "scene/marker_file.h"
@@ -69,15 +70,14 @@ struct Shot {
 Result<Shot> read_shot(const std::string& argument, const Rig& rig) {
   const auto equals = argument.find('=');
   const std::string name = argument.substr(0, equals);
-  const auto camera =
-      std::find_if(rig.cameras.begin(), rig.cameras.end(), [&](const Imager& c) { return c.name == name; });
-  if (equals == std::string::npos || camera == rig.cameras.end())
+  const Imager* camera = find_named(rig.cameras, name);
+  if (equals == std::string::npos || camera == nullptr)
     return usage_error("--frame {}: expected CAMERA=PICTURE with a camera of the rig.", argument);
   LIMN_TRY(cv::Mat image, read_grey_image(argument.substr(equals + 1)));
   if (image.cols != camera->width || image.rows != camera->height)
     return error("{}: expected an image of {}'s size {}x{}, found {}x{}.", argument.substr(equals + 1), name,
                  camera->width, camera->height, image.cols, image.rows);
-  return Shot{&*camera, std::move(image)};
+  return Shot{camera, std::move(image)};
 }
 
 // The pose of a body from its markers in all frames.
@@ -109,9 +109,8 @@ Result<Start> start_from_markers(const AlignOptions& command) {
     return usage_error("--scene: the markers of its prototype need --rig RIG and --frame CAMERA=PICTURE.");
   LIMN_TRY(const scene::Scene scene, scene::load_scene(command.scene));
   const std::vector<Body> bodies = scene::bodies(scene);
-  const auto body =
-      std::find_if(bodies.begin(), bodies.end(), [](const Body& b) { return b.name == "prototype"; });
-  if (body == bodies.end() || body->markers.empty())
+  const Body* body = find_named(bodies, "prototype");
+  if (body == nullptr || body->markers.empty())
     return error("{}: expected markers on the prototype (prototype.markers), found none.",
                  command.scene.string());
   LIMN_TRY(const Track track, track_in_frames(command, *body, scene.folder));
