@@ -83,9 +83,8 @@ struct Patterns {
   int base_bit() const;
   /// Width of the widest stripes of the pairs.
   int widest_stripe_px() const;
-  int steps() const {
-    return code == PatternCode::phase ? options.steps : 0;
-  }  ///< steps of each axis's sinusoid
+  /// Steps of each axis's sinusoid.
+  int steps() const { return code == PatternCode::phase ? options.steps : 0; }
   int images_of_bit() const { return options.inverses ? 2 : 1; }
   int first_row_bit() const { return images_of_bit() * column_bits(); }  ///< index of its first image
   int first_step() const { return images_of_bit() * (column_bits() + row_bits()); }
