@@ -11,6 +11,7 @@
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tests/support/worlds.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/virtual_capture.h"
@@ -27,22 +28,14 @@ using Json = nlohmann::json;
 constexpr double k_share = 0.375;  // scale of each device's image sides: 480 x 384 and 480 x 300 pixels
 constexpr int k_poses = 6;
 
-Json json_at(const fs::path& path) {
-  return Json::parse(read_file(path).value(), nullptr, true, /*ignore_comments=*/true);
-}
-
 // The bench without its prototype, with fewer pixels.
 Json small_bench() {
-  Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
-  for (const char* key : {"scene", "world_from_prototype", "slot_markers"}) world.erase(key);
+  Json world = empty_bench();
   world["objects"] = Json::array();
   world["room"]["lamps"][0].erase("radius_m");  // soft shadows take half of the ray tracing's time
   for (const char* list : {"cameras", "projectors"}) {
     for (Json& device : world[list]) {
-      for (Json& side : device["size"]) side = std::lround(k_share * side.get<double>());
-      Json& lens = device["lens"]["values"];
-      for (const int i : {0, 1}) lens[i] = k_share * lens[i].get<double>();
-      for (const int i : {2, 3}) lens[i] = k_share * (lens[i].get<double>() + 0.5) - 0.5;
+      shrink(k_share, &device);
     }
   }
   return world;
@@ -61,20 +54,20 @@ struct Calibrated {
 };
 
 Calibrated calibrated(const fs::path& folder, const Json& world, const Json& code) {
-  Json plan = json_at(fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json");
+  Json plan = read_json(config_folder() / "plans/bench.json");
   plan.update(code);
   plan["world"] = "world.json";
   plan["board"] = "chessboard:8x5:43mm";
   plan["world_from_board"].erase(plan["world_from_board"].begin() + k_poses, plan["world_from_board"].end());
   EXPECT_TRUE(make_folder(folder).ok());
-  EXPECT_TRUE(write_file(folder / "world.json", world.dump()).ok());
-  EXPECT_TRUE(write_file(folder / "plan.json", plan.dump()).ok());
+  write_json(folder / "world.json", world);
+  write_json(folder / "plan.json", plan);
   const Status captured = run_capture({folder / "plan.json", folder / "captures"});
   EXPECT_TRUE(captured.ok()) << captured.message();
   const Status done = run_solve({.captures = folder / "captures", .out = folder / "rig"});
   EXPECT_TRUE(done.ok()) << done.message();
   if (!done.ok()) return {};
-  return {json_at(folder / "rig/report.json"), load_rig(folder / "rig").value(),
+  return {read_json(folder / "rig/report.json"), load_rig(folder / "rig").value(),
           sim::load_world(folder / "world.json", marker_image).value().rig};
 }
 

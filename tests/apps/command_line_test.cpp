@@ -15,35 +15,20 @@
 #include "core/rig.h"
 #include "core/version.h"
 #include "tests/support/matchers.h"
+#include "tests/support/run_limn.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-  int code = 0;
-  std::string out, err;
-};
-
-Outcome run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "limn");
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  Outcome outcome;
-  outcome.code = run_command_line(static_cast<int>(argv.size()), argv.data());
-  outcome.err = testing::internal::GetCapturedStderr();
-  outcome.out = testing::internal::GetCapturedStdout();
-  return outcome;
-}
+using test::Outcome;
+using test::run_limn;
 
 class CommandLine : public testing::Test {
  protected:
   // Expects this exit code, and each of these parts in the message.
   void expect(const std::vector<std::string>& arguments, int code, const std::vector<std::string>& parts) {
-    const Outcome outcome = run(arguments);
+    const Outcome outcome = run_limn(arguments);
     EXPECT_EQ(outcome.code, code) << outcome.err << outcome.out;
     for (const std::string& part : parts) {
       EXPECT_NE((outcome.err + outcome.out).find(part), std::string::npos)
@@ -87,7 +72,7 @@ class CommandLine : public testing::Test {
 
 // The names of all commands, as the program's own help lists them.
 std::vector<std::string> listed_commands() {
-  const std::string help = run({"--help"}).out;
+  const std::string help = run_limn({"--help"}).out;
   std::istringstream lines(help.substr(std::min(help.size(), help.find("Subcommands:"))));
   std::vector<std::string> names;
   std::string line, name;
@@ -98,18 +83,18 @@ std::vector<std::string> listed_commands() {
 }
 
 TEST_F(CommandLine, HelpIsNoErrorAndShowsAnExample) {
-  EXPECT_EQ(run({"--help"}).code, 0);
+  EXPECT_EQ(run_limn({"--help"}).code, 0);
   const std::vector<std::string> commands = listed_commands();
   EXPECT_GE(commands.size(), 20u);
   for (const std::string& command : commands) {
-    const Outcome help = run({command, "--help"});
+    const Outcome help = run_limn({command, "--help"});
     EXPECT_EQ(help.code, 0);
     EXPECT_NE(help.out.find("Example: limn " + command), std::string::npos) << help.out;
   }
 }
 
 TEST_F(CommandLine, PrintsItsVersion) {
-  const Outcome outcome = run({"--version"});
+  const Outcome outcome = run_limn({"--version"});
   EXPECT_EQ(outcome.code, 0);
   EXPECT_EQ(outcome.out, fmt::format("limn {}\n", version()));
   EXPECT_EQ(std::count(outcome.out.begin(), outcome.out.end(), '.'), 2);
@@ -392,8 +377,8 @@ TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
           Json spoiled = whole;
           spoiled[place] = bad;
           write(name, spoiled.dump());
-          const Outcome outcome = run({"render", "--rig", path("rig"), "--scene", path("scene"), "--poses",
-                                       path("poses.json"), "--out", path("taken/out")});
+          const Outcome outcome = run_limn({"render", "--rig", path("rig"), "--scene", path("scene"),
+                                            "--poses", path("poses.json"), "--out", path("taken/out")});
           ASSERT_TRUE(outcome.code == 1 || outcome.code == 2)
               << outcome.code << name << place.to_string() << " " << bad.dump().substr(0, 80);
           ASSERT_EQ(outcome.err.find("bug in Limn"), std::string::npos)

@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 #include "tracker/family.h"
 
@@ -47,7 +48,7 @@ TEST_F(Detect, WritesCornersAndPoses) {
   options.repeat = 3;
   const Status status = run_detect(options);
   ASSERT_TRUE(status) << status.message();
-  const auto json = nlohmann::json::parse(read_file(options.json).value());
+  const auto json = test::read_json(options.json);
   const auto& image = json["images"][0];
   EXPECT_GT(image["ms"].get<double>(), 0);
   ASSERT_EQ(image["markers"].size(), 1u);
@@ -70,7 +71,7 @@ TEST_F(Detect, OffersThePapersPose) {
   options.size_mm = 80;
   options.pose = PoseMethod::triangle;
   ASSERT_TRUE(run_detect(options));
-  const auto json = nlohmann::json::parse(read_file(options.json).value());
+  const auto json = test::read_json(options.json);
   const auto& poses = json["images"][0]["markers"][0]["poses"];
   ASSERT_EQ(poses.size(), 1u);
   EXPECT_NEAR(poses[0]["camera_from_marker"]["translation_m"][2].get<double>(), 0.4, 1e-3);
@@ -96,7 +97,7 @@ TEST_F(Detect, GoesOnAfterABadImage) {
   const Status status = run_detect(options);
   ASSERT_FALSE(status);
   EXPECT_NE(status.message().find("2 of 3"), std::string::npos);
-  EXPECT_EQ(nlohmann::json::parse(read_file(options.json).value())["images"].size(), 1u);
+  EXPECT_EQ(test::read_json(options.json)["images"].size(), 1u);
 }
 
 TEST_F(Detect, ReadsImagesOfAllDepthsAndChannels) {
@@ -110,7 +111,7 @@ TEST_F(Detect, ReadsImagesOfAllDepthsAndChannels) {
   options.images = {folder / "a.png", folder / "wide.png", folder / "four.png", folder / "wide_four.png"};
   const Status status = run_detect(options);
   ASSERT_TRUE(status) << status.message();
-  const auto images = nlohmann::json::parse(read_file(options.json).value())["images"];
+  const auto images = test::read_json(options.json)["images"];
   ASSERT_EQ(images.size(), 4u);
   for (const auto& image : images) EXPECT_EQ(image["markers"], images[0]["markers"]) << image["file"];
 }
@@ -128,7 +129,7 @@ TEST_F(Detect, FindsNothingInImagesOfNothing) {
   ASSERT_TRUE(write_png(options.images.back(), noise));
   const Status status = run_detect(options);
   ASSERT_TRUE(status) << status.message();
-  const auto images = nlohmann::json::parse(read_file(options.json).value())["images"];
+  const auto images = test::read_json(options.json)["images"];
   EXPECT_EQ(images.size(), options.images.size());
   for (const auto& image : images) EXPECT_TRUE(image["markers"].empty()) << image["file"];
 }

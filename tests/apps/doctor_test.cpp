@@ -8,24 +8,23 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
-#include "apps/command_line.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "tests/device/loopback_server.h"
+#include "tests/device/mjpeg_answer.h"
+#include "tests/support/display.h"
 #include "tests/support/matchers.h"
+#include "tests/support/run_limn.h"
+#include "tests/support/text.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
 using State = Finding::State;
-
-bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
-
-void contains(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
-}
+using test::expect_contains;
+using test::Outcome;
 
 // The first finding of that area and name; an empty name fits all.
 Finding found(const std::vector<Finding>& findings, const std::string& area, const std::string& name = "") {
@@ -40,11 +39,9 @@ void stream(test::LoopbackClient& client) {
   std::vector<uchar> bytes;
   cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(90)), bytes);
   client.receive_until("\r\n\r\n");
-  bool there =
-      client.send("HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n");
+  bool there = client.send(test::k_mjpeg_answer);
   while (there) {
-    there = client.send(fmt::format("--frame\r\nContent-Length: {}\r\n\r\n", bytes.size())) &&
-            client.send({reinterpret_cast<const char*>(bytes.data()), bytes.size()}) && client.send("\r\n");
+    there = client.send(test::mjpeg_part({bytes.begin(), bytes.end()}));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }
@@ -61,13 +58,13 @@ TEST(Doctor, LooksAtThisMachine) {
   const auto findings = examined({});
   const Finding clock = found(findings, "clock");
   EXPECT_EQ(clock.state, State::works);
-  contains(clock.text, "monotonic, resolution");
+  expect_contains(clock.text, "monotonic, resolution");
   const Finding gl = found(findings, "gl");
   EXPECT_EQ(gl.state, State::works) << gl.text;
-  contains(gl.text, "4.5");
-  if (!has_display()) {
+  expect_contains(gl.text, "4.5");
+  if (!test::has_desktop()) {
     EXPECT_EQ(found(findings, "displays").state, State::note);  // nobody asked for it
-    contains(found(findings, "displays").text, "set DISPLAY");
+    expect_contains(found(findings, "displays").text, "set DISPLAY");
   }
   found(findings, "cameras");
 }
@@ -83,7 +80,7 @@ TEST(Doctor, MissingPackagesAreNamed) {
       found(examined({.packages = folder / "packages.txt", .installed = folder / "status"}), "packages");
   EXPECT_EQ(missing.state, State::fails);
   EXPECT_EQ(missing.text, "missing: ham cheese");
-  contains(missing.advice, "apt-get install --no-install-recommends --no-remove ham cheese");
+  expect_contains(missing.advice, "apt-get install --no-install-recommends --no-remove ham cheese");
   ASSERT_TRUE(write_file(folder / "packages.txt", "bread\nbutter\n"));
   const auto all =
       found(examined({.packages = folder / "packages.txt", .installed = folder / "status"}), "packages");
@@ -103,11 +100,11 @@ TEST(Doctor, DevicesThatWorkAreOpenedAndMeasured) {
   const auto findings = examined({.devices = file});
   const Finding stream = found(findings, "devices", "camera0");
   EXPECT_EQ(stream.state, State::works) << stream.text;
-  contains(stream.text, "64x48, ");
+  expect_contains(stream.text, "64x48, ");
   const double rate = std::atof(stream.text.c_str() + stream.text.find(", ") + 2);
   EXPECT_GT(rate, 20);
   EXPECT_LT(rate, 51);
-  contains(found(findings, "devices", "camera1").text, "8x6 [");
+  expect_contains(found(findings, "devices", "camera1").text, "8x6 [");
   const Finding display = found(findings, "devices", "projector0");
   EXPECT_EQ(display.state, State::works);
   EXPECT_EQ(display.text, "offscreen: 320x200");
@@ -119,16 +116,16 @@ TEST(Doctor, WhatDoesNotWorkIsNamedAndTheRestGoesOn) {
                                         {"name": "screen", "monitor": "offscreen", "size": [8, 6]})");
   auto findings = examined({.devices = file});
   EXPECT_EQ(found(findings, "devices", "camera0").state, State::fails);
-  contains(found(findings, "devices", "camera0").text, "Plug the camera in");
+  expect_contains(found(findings, "devices", "camera0").text, "Plug the camera in");
   EXPECT_EQ(found(findings, "devices", "projector0").state, State::fails);
   EXPECT_EQ(found(findings, "devices", "screen").state, State::works);
-  if (!has_display()) {
+  if (!test::has_desktop()) {
     EXPECT_EQ(found(findings, "displays", "desktop").state, State::fails);
   }
 
   findings = examined({.devices = file.parent_path() / "absent.json"});
   EXPECT_EQ(found(findings, "devices", "file").state, State::fails);
-  contains(found(findings, "devices", "file").text, "absent.json");
+  expect_contains(found(findings, "devices", "file").text, "absent.json");
   found(findings, "cameras");
 }
 
@@ -139,7 +136,7 @@ TEST(Doctor, DevicesOfAnotherRigAreRefused) {
   ASSERT_TRUE(save_rig(rig, file.parent_path() / "rig"));
   const auto findings = examined({.devices = file, .rig = file.parent_path() / "rig"});
   EXPECT_EQ(found(findings, "devices", "file").state, State::fails);
-  contains(found(findings, "devices", "file").text, "expected the rig's left");
+  expect_contains(found(findings, "devices", "file").text, "expected the rig's left");
 }
 
 TEST(Doctor, EachDisplayShowsItsOwnSign) {
@@ -153,35 +150,24 @@ TEST(Doctor, EachDisplayShowsItsOwnSign) {
 }
 
 TEST(Doctor, ShowsOnEveryMonitor) {
-  if (!has_display()) GTEST_SKIP() << "no display: Doctor.ShowsOnEveryMonitor";
+  if (!test::has_desktop()) GTEST_SKIP() << "no display: Doctor.ShowsOnEveryMonitor";
   const auto findings = examined({.show_s = 0.3});
   const Finding monitor = found(findings, "displays");
   EXPECT_EQ(monitor.state, State::works);
-  contains(monitor.text, "800x600 at");
+  expect_contains(monitor.text, "800x600 at");
   EXPECT_EQ(findings.back().name, monitor.name);
   EXPECT_EQ(findings.back().text, "shows the number 1 on red");
 }
 
 TEST(Doctor, ShowingWithoutADesktopIsAFailure) {
-  if (has_display()) GTEST_SKIP() << "a display is there: Doctor.ShowingWithoutADesktopIsAFailure";
+  if (test::has_desktop()) GTEST_SKIP() << "a display is there: Doctor.ShowingWithoutADesktopIsAFailure";
   const Finding desktop = found(examined({.show_s = 0.1}), "displays", "desktop");
   EXPECT_EQ(desktop.state, State::fails);
 }
 
-struct Outcome {
-  int code = 0;
-  std::string out;
-};
-
 Outcome run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), {"limn", "doctor"});
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  testing::internal::CaptureStdout();
-  Outcome outcome;
-  outcome.code = run_command_line(static_cast<int>(argv.size()), argv.data());
-  outcome.out = testing::internal::GetCapturedStdout();
-  return outcome;
+  arguments.insert(arguments.begin(), "doctor");
+  return test::run_limn(std::move(arguments));
 }
 
 TEST(Doctor, TheCommandsExitAndJsonSayWhetherAllWorks) {
@@ -197,7 +183,7 @@ TEST(Doctor, TheCommandsExitAndJsonSayWhetherAllWorks) {
   const Outcome fails = run({"--devices", good.string(), "--json"});
   EXPECT_EQ(fails.code, 1);
   EXPECT_EQ(nlohmann::json::parse(fails.out)["works"], false);
-  contains(run({"--devices", good.string()}).out, "does not devices   camera0");
+  expect_contains(run({"--devices", good.string()}).out, "does not devices   camera0");
   EXPECT_EQ(run({"--rig", "rig"}).code, 2);
 }
 

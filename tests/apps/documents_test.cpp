@@ -7,9 +7,9 @@
 #include <regex>
 #include <sstream>
 
-#include "apps/command_line.h"
 #include "core/file.h"
 #include "design/rig_description.h"
+#include "tests/support/run_limn.h"
 
 namespace limn::apps {
 namespace {
@@ -21,15 +21,6 @@ constexpr const char* k_pages[] = {
     "README.md",         "CONTRIBUTING.md",      "config/README.md", "docs/architecture.md",
     "docs/formats.md",   "docs/measurements.md", "docs/osc.md",      "docs/remote.md",
     "docs/setting-up.md"};
-
-std::string printed(std::vector<std::string> arguments, int* code) {
-  arguments.insert(arguments.begin(), "limn");
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  testing::internal::CaptureStdout();
-  *code = run_command_line(static_cast<int>(argv.size()), argv.data());
-  return testing::internal::GetCapturedStdout();
-}
 
 struct Quoted {
   std::string where, command;
@@ -63,9 +54,9 @@ TEST(Documents, EveryCommandAndOptionExists) {
     for (const Quoted& quoted : quoted_commands(page)) {
       auto help = helps.find(quoted.command);
       if (help == helps.end()) {
-        int code = 0;
-        help = helps.emplace(quoted.command, printed({quoted.command, "--help"}, &code)).first;
-        EXPECT_EQ(code, 0) << quoted.where << ": limn " << quoted.command;
+        const test::Outcome outcome = test::run_limn({quoted.command, "--help"});
+        help = helps.emplace(quoted.command, outcome.out).first;
+        EXPECT_EQ(outcome.code, 0) << quoted.where << ": limn " << quoted.command;
       }
       if (quoted.command == "bench") continue;  // its options belong to the benches
       for (const std::string& option : quoted.options) {
@@ -85,9 +76,9 @@ TEST(Documents, QuoteWhatLimnPlanPrints) {
   const std::string page = read_file(k_source / "docs/setting-up.md").value();
   for (const char* file : {"config/described/first.json", "config/described/large.json"}) {
     EXPECT_NE(page.find(fmt::format("./limn plan {}", file)), std::string::npos);
-    int code = 0;
-    std::istringstream lines(printed({"plan", (k_source / file).string()}, &code));
-    EXPECT_EQ(code, 0) << file;
+    const test::Outcome outcome = test::run_limn({"plan", (k_source / file).string()});
+    std::istringstream lines(outcome.out);
+    EXPECT_EQ(outcome.code, 0) << file << ": " << outcome.err;
     int count = 0;
     for (std::string line; std::getline(lines, line); ++count)
       EXPECT_NE(page.find("    " + line + "\n"), std::string::npos)

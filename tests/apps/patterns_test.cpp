@@ -9,6 +9,7 @@
 #include "calib/response/response_patterns.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -41,7 +42,7 @@ TEST(PatternsCommand, WritesTheResponseImages) {
     EXPECT_TRUE(test::image_near(*image, calib::draw_response(i, 40, 24), 0, 0, "response"));
   }
   EXPECT_FALSE(std::filesystem::exists(out / calib::image_name(count)));
-  const auto list = nlohmann::json::parse(read_file(out / "patterns.json").value());
+  const auto list = test::read_json(out / "patterns.json");
   EXPECT_EQ(list["pictures"].size(), static_cast<std::size_t>(count));
   EXPECT_EQ(list["pictures"][0]["shows"], "black");
 }

@@ -12,6 +12,7 @@
 #include "core/rig.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tests/support/worlds.h"
 #include "tracker/marker_image.h"
 
 namespace limn::apps {
@@ -22,27 +23,19 @@ using namespace test;
 using calib::RigVerdict;
 using Json = nlohmann::json;
 
-Json json_at(const fs::path& path) {
-  return Json::parse(read_file(path).value(), nullptr, true, /*ignore_comments=*/true);
-}
-
 // The bench without its prototype; its projector's target is raised by `up_m`.
 fs::path bench_world(const fs::path& path, double up_m) {
-  Json world = json_at(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json");
-  for (const char* key : {"scene", "world_from_prototype", "slot_markers"}) world.erase(key);
+  Json world = empty_bench();
   world["projectors"][0]["target_m"][2] = world["projectors"][0]["target_m"][2].get<double>() + up_m;
-  EXPECT_TRUE(write_file(path, world.dump()).ok());
-  return path;
+  return write_json(path, world);
 }
 
 // A plan with one pose, where the light reaches the board well.
 fs::path plan_of(const fs::path& world) {
-  Json plan = json_at(fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json");
+  Json plan = read_json(config_folder() / "plans/bench.json");
   plan["world"] = world.filename();
   plan["world_from_board"] = Json::array({plan["world_from_board"][3]});
-  const fs::path path = world.parent_path() / ("plan-" + world.filename().string());
-  EXPECT_TRUE(write_file(path, plan.dump()).ok());
-  return path;
+  return write_json(world.parent_path() / ("plan-" + world.filename().string()), plan);
 }
 
 // RMS distance between the lights of two projectors for the same pixels, on the plane y = 0 around the
@@ -102,8 +95,8 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   EXPECT_LT(light_apart_mm(repaired->projectors[0], truth.projectors[0]), 1);
   EXPECT_EQ(repaired->projectors[0].lens.values, rig.projectors[0].lens.values);
   EXPECT_TRUE(fs::exists(again.out / "projector0.cameramodel"));
-  EXPECT_EQ(json_at(again.out / "rig.json")["provenance"]["re_solved"]["device"], "projector0");
-  const Json told = json_at(again.out / "recheck.json");
+  EXPECT_EQ(read_json(again.out / "rig.json")["provenance"]["re_solved"]["device"], "projector0");
+  const Json told = read_json(again.out / "recheck.json");
   EXPECT_EQ(told["verdict"], "nudged");
   EXPECT_TRUE(told["boards"].contains("pose00"));
 
@@ -119,16 +112,15 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
 
 // The studio with its prototype; projector1's target is raised by `up_m`.
 fs::path studio_plan(const fs::path& folder, double up_m) {
-  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
-  Json world = json_at(config / "worlds/studio.json");
+  const fs::path config = config_folder();
+  Json world = read_json(config / "worlds/studio.json");
   world["scene"] = (config / "scenes/door").string();
   world["projectors"][1]["target_m"][2] = world["projectors"][1]["target_m"][2].get<double>() + up_m;
-  Json plan = json_at(config / "plans/studio.json");
+  Json plan = read_json(config / "plans/studio.json");
   plan["world"] = "world.json";
   fs::create_directories(folder);
-  EXPECT_TRUE(write_file(folder / "world.json", world.dump()).ok());
-  EXPECT_TRUE(write_file(folder / "plan.json", plan.dump()).ok());
-  return folder / "plan.json";
+  write_json(folder / "world.json", world);
+  return write_json(folder / "plan.json", plan);
 }
 
 TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {

@@ -14,6 +14,7 @@
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "sim/car_door.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 #include "tracker/family.h"
 
@@ -109,7 +110,7 @@ TEST(Render, StandsAPartOnAMarkerOfAnImage) {
   EXPECT_TRUE(is_paper(at({0.074, 0, -0.1})));
   EXPECT_FALSE(is_paper(at({0, 0, -0.118})));
   EXPECT_TRUE(is_paper(at({-0.03, 0, -0.1})));
-  const json coverage = json::parse(read_file(folder / "out" / "coverage.json").value());
+  const json coverage = test::read_json(folder / "out" / "coverage.json");
   EXPECT_EQ(coverage["parts"][0]["part"], "flag");
   EXPECT_EQ(coverage["parts"][0]["off_surface"], 1);
   EXPECT_GT(coverage["parts"][0]["viewer_pixels"], 5000);
@@ -158,7 +159,7 @@ TEST_F(RenderDoor, PosesPlaceEverythingAndEveryImageIsWritten) {
   EXPECT_EQ(light.size(), cv::Size(800, 600));
   EXPECT_GT(cv::countNonZero(light.reshape(1)), 1000);
   EXPECT_GT(cv::countNonZero(read_image(folder / "out/composite-camera0.png").value().reshape(1)), 1000);
-  const json coverage = json::parse(read_file(folder / "out/coverage.json").value());
+  const json coverage = test::read_json(folder / "out/coverage.json");
   ASSERT_EQ(coverage["parts"].size(), 2u);
   for (const auto& part : coverage["parts"]) {
     const double on = part["on_surface"], off = part["off_surface"];
@@ -239,7 +240,7 @@ TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   ASSERT_TRUE(run_render(options));
   const cv::Mat clipped = read_image(folder / "out/clipped-projector0.png").value();
   EXPECT_GT(cv::countNonZero(clipped == 255), 1000) << "nothing is a million times as bright";
-  const json light = json::parse(read_file(folder / "out/coverage.json").value())["light"];
+  const json light = test::read_json(folder / "out/coverage.json")["light"];
   EXPECT_EQ(light["compensation"], "geometry");
   EXPECT_GT(light["projectors"][0]["too_bright_wanted"], 0.001);
   options.light.level = {};

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/align.h"
 #include "core/config.h"
-#include "core/file.h"
 #include "core/rig.h"
 #include "scene/marker_file.h"
 #include "scene/mesh_bvh.h"
@@ -17,7 +17,8 @@
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/text.h"
+#include "tests/support/worlds.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/virtual_capture.h"
 
@@ -28,11 +29,8 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d;
 using namespace test::literals;
 
-const fs::path k_plan = fs::path(LIMN_SOURCE_DIR) / "config/plans/bench.json";
-
-sim::World bench() {
-  return sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json", marker_image).value();
-}
+const fs::path k_plan = test::config_folder() / "plans/bench.json",
+               k_door = test::config_folder() / "scenes/door/door.glb";
 
 struct Errors {
   int count = 0;
@@ -67,23 +65,58 @@ Errors errors_on_clay(const scene::ScanSurface& surface, const sim::World& world
   return e;
 }
 
-nlohmann::json read_json(const fs::path& path) { return nlohmann::json::parse(read_file(path).value()); }
+// The virtual door, scanned once with the true rig.
+class DoorScan : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    out_ = test::test_folder();
+    world_ = test::bench_world();
+    ASSERT_TRUE(save_rig(world_->rig, out_ / "rig").ok());
+    ScanCommand command;
+    command.plan = k_plan;
+    command.rig = out_ / "rig";
+    command.out = out_ / "scan";
+    const Status done = run_scan(command);
+    ASSERT_TRUE(done.ok()) << done.message();
+  }
+  static void TearDownTestSuite() { world_.reset(); }
 
-// Scans the virtual door with the true rig and aligns a CAD mesh to the scan.
-TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
-  const fs::path out = test::test_folder();
-  const sim::World world = bench();
-  ASSERT_TRUE(save_rig(world.rig, out / "rig").ok());
-  ScanCommand command;
-  command.plan = k_plan;
-  command.rig = out / "rig";
-  command.out = out / "scan";
-  const Status done = run_scan(command);
-  ASSERT_TRUE(done.ok()) << done.message();
+  // Lays the CAD mesh onto the scan, from a pose that is off by centimetres.
+  static AlignCommand align_command(const fs::path& out) {
+    const Pose truth = world_->world_from_prototype;
+    const Pose start(exp_rotation({0.1, -0.1, 0.1}) * truth.rotation,
+                     truth.translation + Vector3d(0.03, -0.03, 0.026));
+    AlignCommand align;
+    align.scan = out_ / "scan";
+    align.mesh = k_door;
+    align.units = scene::LengthUnit::metre;
+    align.start = test::write_json(out / "start.json", {{"world_from_prototype", to_json(start)}});
+    align.out = out / "aligned";
+    return align;
+  }
+
+  // The message of scanning the same captures with another rig.
+  static std::string refusal_of(const Rig& rig, const fs::path& out) {
+    EXPECT_TRUE(save_rig(rig, out / "rig").ok());
+    ScanCommand command;
+    command.captures = out_ / "scan/captures";
+    command.rig = out / "rig";
+    command.out = out / "scan";
+    const Status scanned = run_scan(command);
+    EXPECT_FALSE(scanned.ok());
+    EXPECT_FALSE(fs::exists(command.out));
+    return scanned.ok() ? "" : scanned.message();
+  }
+
+  static inline fs::path out_;
+  static inline std::optional<sim::World> world_;
+};
+
+TEST_F(DoorScan, IsWithinATenthOfAMillimetreOfTheClay) {
   for (const char* name : {"points.ply", "mesh.ply"}) {
-    const auto surface = scene::load_ply(out / "scan" / name);
+    const auto surface = scene::load_ply(out_ / "scan" / name);
     ASSERT_TRUE(surface.ok()) << surface.message();
-    const Errors e = errors_on_clay(*surface, world, 23);
+    const Errors e = errors_on_clay(*surface, *world_, 23);
     printf("[ scan     ] %s: %.3f mm RMS off the clay, pulls %.2f\n", name, e.rms_mm, e.rms_pull);
     EXPECT_GT(e.count, 5000);
     EXPECT_LT(e.rms_mm, 0.15);  // 0.11 measured; required: 0.3
@@ -95,29 +128,24 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
     EXPECT_GT(e.within_two, 0.85);
     EXPECT_LT(e.normal_rms_deg, 4);
   }
-  const auto json = read_json(out / "scan/scan.json");
+}
+
+TEST_F(DoorScan, ReportsItsPointsAndDrawsThem) {
+  const auto json = test::read_json(out_ / "scan/scan.json");
   EXPECT_GT(json["points"], 250000);
   EXPECT_LT(json["stddev_mm"]["median"], 0.1);
   for (const char* name : {"mesh.png", "shaded-pose00-camera0.png", "deviation-pose00-camera0.png"})
-    EXPECT_TRUE(fs::exists(out / "scan" / name)) << name;
+    EXPECT_TRUE(fs::exists(out_ / "scan" / name)) << name;
+}
 
-  const Pose truth = world.world_from_prototype;
-  const Pose start(exp_rotation({0.1, -0.1, 0.1}) * truth.rotation,
-                   truth.translation + Vector3d(0.03, -0.03, 0.026));
-  const nlohmann::json poses = {{"world_from_prototype", to_json(start)}};
-  ASSERT_TRUE(write_file(out / "start.json", poses.dump()).ok());
-  AlignCommand align;
-  align.scan = out / "scan";
-  align.mesh = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door/door.glb";
-  align.units = scene::LengthUnit::metre;
-  align.start = out / "start.json";
-  align.out = out / "aligned";
+TEST_F(DoorScan, TheCadIsLaidOntoIt) {
+  const AlignCommand align = align_command(test::test_folder());
   const Status laid = run_align(align);
   ASSERT_TRUE(laid.ok()) << laid.message();
-  const auto posed = scene::load_poses(out / "aligned/poses.json", *world.scene);
+  const auto posed = scene::load_poses(align.out / "poses.json", *world_->scene);
   ASSERT_TRUE(posed.ok()) << posed.message();
-  EXPECT_TRUE(test::pose_near(*posed->world_from_prototype, truth, 0.05_deg, 0.3_mm));
-  const auto report = read_json(align.out / "align.json");
+  EXPECT_TRUE(test::pose_near(*posed->world_from_prototype, world_->world_from_prototype, 0.05_deg, 0.3_mm));
+  const auto report = test::read_json(align.out / "align.json");
   EXPECT_TRUE(report["free_directions"].empty());
   EXPECT_GE(report["differences"].size(),
             4U);  // the plates of the markers, up to 3 mm above the clay
@@ -127,19 +155,23 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   }
   for (const char* name : {"residual.ply", "residual.png", "residual-side.png"})
     EXPECT_TRUE(fs::exists(align.out / name)) << name;
+}
 
-  // The door's markers as a learned body, in the frame of one of them: they are found on the CAD mesh.
-  const std::vector<BodyMarker>& on_door = world.scene->prototype->markers;
+// The door's markers as a learned body, in the frame of one of them: they are found on the CAD mesh, and a
+// scene that names their file is the same scene.
+TEST_F(DoorScan, MarkersOfALearnedBodyAreFoundOnTheCad) {
+  const fs::path out = test::test_folder();
+  const std::vector<BodyMarker>& on_door = world_->scene->prototype->markers;
   nlohmann::json body = {{"schema", "limn.body/1"}, {"markers", nlohmann::json::array()}};
   for (const BodyMarker& marker : on_door)
     body["markers"].push_back(
         {{"name", marker.marker.text()},
          {"size_mm", 1e3 * marker.size_m},
          {"body_from_marker", to_json(on_door[2].body_from_marker.inverse() * marker.body_from_marker)}});
-  ASSERT_TRUE(write_file(out / "body.json", body.dump()).ok());
-  const calib::CaptureSet captures = calib::load_captures(out / "scan/captures").value();
-  align.body = out / "body.json";
-  align.rig = out / "rig";
+  const calib::CaptureSet captures = calib::load_captures(out_ / "scan/captures").value();
+  AlignCommand align = align_command(out);
+  align.body = test::write_json(out / "body.json", body);
+  align.rig = out_ / "rig";
   align.frames = {"camera0=" + captures.poses[0].images[0][0][captures.patterns[0].white()].string()};
   const Status with_body = run_align(align);
   ASSERT_TRUE(with_body.ok()) << with_body.message();
@@ -149,63 +181,56 @@ TEST(Scan, MeasuresTheVirtualDoorToATenthOfAMillimetreAndTheCadIsLaidOntoIt) {
   for (std::size_t i = 0; i < on_door.size(); ++i)
     EXPECT_TRUE(test::pose_near((*found)[i].body_from_marker, on_door[i].body_from_marker, 0.1_deg, 0.5_mm))
         << on_door[i].marker.text();
-  // A scene that names that file is the same scene.
+
   const fs::path project = out / "project";
-  fs::copy(world.scene->folder, project, fs::copy_options::recursive);
+  fs::copy(world_->scene->folder, project, fs::copy_options::recursive);
   fs::copy_file(align.out / "markers.json", project / "markers.json");
-  nlohmann::json file = read_json(project / "scene.json");
+  nlohmann::json file = test::read_json(project / "scene.json");
   file["prototype"]["markers"] = "markers.json";
-  ASSERT_TRUE(write_file(project / "scene.json", file.dump(2)).ok());
+  test::write_json(project / "scene.json", file);
   const auto same = scene::load_scene(project);
   ASSERT_TRUE(same) << same.message();
   EXPECT_EQ(same->prototype->markers.size(), on_door.size());
   file["prototype"]["markers"] = "none.json";
-  ASSERT_TRUE(write_file(project / "scene.json", file.dump(2)).ok());
-  EXPECT_NE(scene::load_scene(project).message().find("none.json"), std::string::npos);
-  align.body.clear();
-  align.frames.clear();
+  test::write_json(project / "scene.json", file);
+  test::expect_contains(scene::load_scene(project).message(), "none.json");
+}
 
+TEST_F(DoorScan, ACadInOtherUnitsIsRefused) {
+  AlignCommand align = align_command(test::test_folder());
   align.start.clear();
   align.units = scene::LengthUnit::millimetre;
-  align.out = out / "wrong";
   const Status wrong = run_align(align);
   ASSERT_FALSE(wrong.ok());
-  EXPECT_NE(wrong.message().find("check --units"), std::string::npos) << wrong.message();
+  test::expect_contains(wrong.message(), "check --units");
   EXPECT_FALSE(fs::exists(align.out));
+}
 
-  // Another rig: first a projector of another size, then one that is turned by two degrees.
-  Rig other = world.rig;
+TEST_F(DoorScan, AProjectorOfAnotherSizeIsNamed) {
+  Rig other = world_->rig;
   other.projectors[0].width = 1920;
-  ASSERT_TRUE(save_rig(other, out / "rig-size").ok());
-  other = world.rig;
+  const std::string message = refusal_of(other, test::test_folder());
+  test::expect_contains(message, "projector0");
+  test::expect_contains(message, "1920x800");
+}
+
+TEST_F(DoorScan, AProjectorThatWasTurnedByTwoDegreesIsNoticed) {
+  Rig other = world_->rig;
   other.projectors[0].imager_from_world =
       Pose(exp_rotation({0.035, 0, 0}), Vector3d::Zero()) * other.projectors[0].imager_from_world;
-  ASSERT_TRUE(save_rig(other, out / "rig-turned").ok());
-  ScanCommand again;
-  again.captures = out / "scan/captures";
-  again.out = out / "other";
-  again.rig = out / "rig-size";
-  const Status size = run_scan(again);
-  ASSERT_FALSE(size.ok());
-  EXPECT_NE(size.message().find("projector0"), std::string::npos) << size.message();
-  EXPECT_NE(size.message().find("1920x800"), std::string::npos) << size.message();
-  again.rig = out / "rig-turned";
-  const Status turned = run_scan(again);
-  ASSERT_FALSE(turned.ok());
-  EXPECT_NE(turned.message().find("moved since"), std::string::npos) << turned.message();
-  EXPECT_FALSE(fs::exists(again.out));
+  test::expect_contains(refusal_of(other, test::test_folder()), "moved since");
 }
 
 TEST(Scan, LaysPosesOfAMovedPrototypeOntoEachOtherWhenTold) {
   const fs::path out = test::test_folder();
-  const sim::World world = bench();
+  const sim::World world = test::bench_world();
   ASSERT_TRUE(save_rig(world.rig, out / "rig").ok());
   const Pose home = world.world_from_prototype;
   const Pose elsewhere(exp_rotation({0.02, 0.05, 0.24}) * home.rotation,
                        home.translation + Vector3d(0.07, -0.05, 0.02));
   {
     const Plan plan = load_plan(k_plan).value();
-    sim::VirtualRig rig(bench());
+    sim::VirtualRig rig(test::bench_world());
     ASSERT_TRUE(capture_prototype(plan, {home, elsewhere}, &rig, out / "captures").ok());
   }
   ScanCommand command;
@@ -220,10 +245,8 @@ TEST(Scan, LaysPosesOfAMovedPrototypeOntoEachOtherWhenTold) {
   command.moved = true;
   const Status done = run_scan(command);
   ASSERT_TRUE(done.ok()) << done.message();
-  const auto json = read_json(command.out / "scan.json");
-  const auto found = json["views"][1]["first_from_pose"];
-  const std::vector<double> q = found["rotation_wxyz"], t = found["translation_m"];
-  const Pose first_from_pose(Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Vector3d(t[0], t[1], t[2]));
+  const auto json = test::read_json(command.out / "scan.json");
+  const Pose first_from_pose = test::pose_of(json["views"][1]["first_from_pose"]);
   EXPECT_TRUE(test::pose_near(first_from_pose * elsewhere, home, 0.05_deg, 0.3_mm));
   EXPECT_LT(json["views_agree"]["rms_mm"], 0.3);
   const auto mesh = scene::load_ply(command.out / "mesh.ply");
@@ -252,7 +275,7 @@ TEST(Scan, CallsWrongOptionsWrongUsage) {
 
 TEST(Align, CallsWrongOptionsWrongUsage) {
   AlignCommand command;
-  command.mesh = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door/door.glb";
+  command.mesh = k_door;
   command.units = scene::LengthUnit::metre;
   command.out = test::test_folder() / "out";
   EXPECT_TRUE(run_align(command).error().wrong_usage);  // neither a scan nor markers

@@ -5,10 +5,10 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-#include "core/file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "sim/world.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
 
@@ -39,7 +39,7 @@ TEST(Simulate, WritesImagesTheTruthAndTheRig) {
                      read_image(out / "camera0-white.png").value(), cv::NORM_INF),
             50);
 
-  const auto json = nlohmann::json::parse(read_file(out / "truth.json").value());
+  const auto json = test::read_json(out / "truth.json");
   EXPECT_EQ(json["slots"]["mirror"]["variant"], "sport");
   const sim::World world = sim::load_world(k_bench, apps::marker_image).value();
   const Rig rig = load_rig(out / "rig").value();

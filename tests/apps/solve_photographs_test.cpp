@@ -12,8 +12,8 @@
 
 #include "apps/solve.h"
 #include "calib/board/board.h"
-#include "core/file.h"
 #include "core/rig.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -225,7 +225,7 @@ TEST(SolvePhotographs, FiveRealPosesHoldOutByTheReportAndByAnIndependentJudge) {
   const fs::path folder = test::test_folder();
   const Status status = run_solve(five_poses(*data, folder / "rig"));
   ASSERT_TRUE(status.ok()) << status.message();
-  const json report = json::parse(read_file(folder / "rig" / "report.json").value());
+  const json report = test::read_json(folder / "rig" / "report.json");
   EXPECT_LE(report["held_out"]["rms_px"], k_max_held_out_px);
   EXPECT_EQ(report["held_out"]["poses"].size(), 5U);
   // Share of the pixels lit directly. Of all pixels with 10 levels between white and black, which includes

@@ -22,6 +22,7 @@
 #include "core/median.h"
 #include "core/rig.h"
 #include "tests/calib/true_rig.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
 
@@ -167,7 +168,7 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
        {"camera0.cameramodel", "projector0.cameramodel", "report.html", "observations.json"})
     EXPECT_TRUE(fs::exists(out / file)) << file;
 
-  const auto report = nlohmann::json::parse(read_file(out / "report.json").value());
+  const auto report = test::read_json(out / "report.json");
   EXPECT_EQ(report["verdict"], "good");
   EXPECT_LT(report["held_out"]["rms_px"], 0.15);
   EXPECT_EQ(report["held_out"]["poses"].size(), 6U);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <optional>
 #include <random>
 
@@ -13,7 +12,7 @@
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/worlds.h"
 
 namespace limn::calib {
 namespace {
@@ -22,12 +21,6 @@ using Eigen::Vector3d;
 using namespace test;
 
 constexpr double k_noise_m = 0.1e-3;
-
-sim::World bench() {
-  return sim::load_world(std::filesystem::path(LIMN_SOURCE_DIR) / "config/worlds/bench.json",
-                         apps::marker_image)
-      .value();
-}
 
 constexpr int k_step = 8;  // camera pixels between points
 
@@ -97,7 +90,7 @@ struct Errors {
 
 TEST(Align, ComesHomeFromFiftyMillimetresAndTenDegreesOffOnPartialScans) {
   auto rng = test_rng();
-  const sim::World world = bench();
+  const sim::World world = bench_world();
   const scene::Mesh& door = world.scene->prototype->mesh;
   const scene::MeshBvh index(door);
   const Pose truth = world.world_from_prototype;
@@ -130,7 +123,7 @@ TEST(Align, ComesHomeFromFiftyMillimetresAndTenDegreesOffOnPartialScans) {
 
 TEST(Align, FindsTheDoorFromAnyPoseWithoutAStart) {
   auto rng = test_rng();
-  sim::World world = bench();
+  sim::World world = bench_world();
   const scene::Mesh& door = world.scene->prototype->mesh;
   const scene::MeshBvh index(door);
   const scene::ScanSurface scan = scan_captures(world, landings(world), 0, 1, rng);

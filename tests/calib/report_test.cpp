@@ -9,6 +9,7 @@
 #include "core/file.h"
 #include "core/rig.h"
 #include "tests/calib/observed_world.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 
 namespace limn::calib {
@@ -98,7 +99,7 @@ TEST(Report, RemembersEarlierCalibrationsAndHowFarTheProjectorHasMoved) {
   }
   const Report second = reported(world, folder, "2026-11-21T10:00:00Z");
   ASSERT_TRUE(write_rig_folder(second, {}, folder).ok());
-  const json report = json::parse(read_file(folder / "report.json").value());
+  const json report = test::read_json(folder / "report.json");
   ASSERT_EQ(report["history"].size(), 1U);
   EXPECT_EQ(report["history"][0]["made_at"], "2026-11-20T10:00:00Z");
   EXPECT_GT(report["history"][0]["held_out_px"], 0.01);

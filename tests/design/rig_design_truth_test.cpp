@@ -14,6 +14,7 @@
 #include "sim/world.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"
+#include "tests/wizard/small_plan.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
 
@@ -45,8 +46,6 @@ void expect_within_two(double found, double expected, const std::string& what) {
   EXPECT_GT(found, expected / 2) << what;
 }
 
-json read_json(const fs::path& path) { return json::parse(read_file(path).value(), nullptr, true, true); }
-
 // Calibrates on the plan's virtual rig and compares. Without `own_noise`, the noise of `described` is
 // replaced by the noise that the report found.
 void check_rig(DescribedRig described,
@@ -58,7 +57,7 @@ void check_rig(DescribedRig described,
   const Status calibrated = run_calibrate({.plan = plan, .out = out, .all = true});
   testing::internal::GetCapturedStdout();
   ASSERT_TRUE(calibrated.ok()) << calibrated.message();
-  const json report = read_json(out / "report.json");
+  const json report = test::read_json(out / "report.json");
   const auto rig = load_rig(out);
   ASSERT_TRUE(rig) << rig.message();
   const auto world = sim::load_world(world_file, marker_image);
@@ -97,32 +96,18 @@ void check_rig(DescribedRig described,
   }
 }
 
-// Scales an imager's width and height by `share`; its field of view stays.
-void shrink(double share, json* imager) {
-  for (auto& side : (*imager)["size"]) side = static_cast<int>(share * side.get<int>());
-  auto& values = (*imager)["lens"]["values"];
-  for (std::size_t i = 0; i < 2; ++i) values[i] = share * values[i].get<double>();
-  for (std::size_t i = 2; i < 4; ++i) values[i] = share * (values[i].get<double>() + 0.5) - 0.5;
-}
-
 // The bench with fewer pixels, to save time. The noise is that of the report, the rest is as described.
 TEST(ForeseeTruth, ACoarseBenchComesOutAsForeseen) {
   const fs::path folder = test::test_folder();
-  json world = read_json(k_config / "worlds/bench.json"), plan = read_json(k_config / "plans/bench.json"),
-       described = read_json(k_config / "described/bench.json");
-  world["scene"] = (k_config / "scenes/door").string();
-  shrink(0.625, &world["cameras"][0]);
-  shrink(0.25, &world["projectors"][0]);
+  const fs::path plan = test::small_plan(folder);
+  const json world = test::read_json(folder / "world.json");
+  json described = test::read_json(k_config / "described/bench.json");
   described["cameras"][0]["size"] = world["cameras"][0]["size"];
   described["projectors"][0]["size"] = world["projectors"][0]["size"];
-  plan["world"] = "world.json";
-  plan["board"] = described["board"] = "charuco:8x6:55mm";
-  ASSERT_TRUE(write_file(folder / "world.json", world.dump(2)));
-  ASSERT_TRUE(write_file(folder / "plan.json", plan.dump(2)));
-  ASSERT_TRUE(write_file(folder / "described.json", described.dump(2)));
-  const auto loaded = load_described(folder / "described.json");
+  described["board"] = test::read_json(plan)["board"];
+  const auto loaded = load_described(test::write_json(folder / "described.json", described));
   ASSERT_TRUE(loaded) << loaded.message();
-  check_rig(*loaded, folder / "plan.json", folder / "world.json", false, folder / "rig");
+  check_rig(*loaded, plan, folder / "world.json", false, folder / "rig");
 }
 
 // Takes minutes at full size: LIMN_RIGS=bench or studio selects the rig.

@@ -2,15 +2,13 @@
 
 #include "core/file.h"
 #include "tests/support/matchers.h"
+#include "tests/support/text.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
-
-void contains(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
-}
+using test::expect_contains;
 
 Result<Devices> loaded(const std::string& cameras, const std::string& displays = "") {
   const fs::path file = test::test_folder() / "devices.json";
@@ -67,23 +65,24 @@ TEST(Devices, FilesAreNamedFromTheFilesFolder) {
 }
 
 TEST(Devices, WhatIsWrongIsNamedWithItsPlace) {
-  contains(problem(R"({"name": "camera0"})"), "cameras[0].source: this key is missing");
-  contains(problem(R"({"name": "camera0", "source": "v4l2:/dev/video0", "exposure": 3})"), "exposure");
-  contains(problem(R"({"name": "camera0", "source": ""})"), "cameras[0].source: expected a camera's source");
-  contains(problem(R"({"name": "camera0", "source": "x", "exposure_ms": -1})"),
-           "cameras[0].exposure_ms: expected a");
-  contains(problem(R"({"name": "camera0", "source": "x", "size": [640.5, 480]})"),
-           "cameras[0].size: expected");
-  contains(problem("", R"({"name": "p", "monitor": "offscreen", "latency_ms": -3})"),
-           "displays[0].latency_ms");
-  contains(problem("", R"({"name": "p"})"), "displays[0].monitor: this key is missing");
-  contains(problem(R"({"name": "a", "source": "x"}, {"name": "a", "source": "y"})"),
-           "cameras[1]: expected a name");
-  contains(
+  expect_contains(problem(R"({"name": "camera0"})"), "cameras[0].source: this key is missing");
+  expect_contains(problem(R"({"name": "camera0", "source": "v4l2:/dev/video0", "exposure": 3})"), "exposure");
+  expect_contains(problem(R"({"name": "camera0", "source": ""})"),
+                  "cameras[0].source: expected a camera's source");
+  expect_contains(problem(R"({"name": "camera0", "source": "x", "exposure_ms": -1})"),
+                  "cameras[0].exposure_ms: expected a");
+  expect_contains(problem(R"({"name": "camera0", "source": "x", "size": [640.5, 480]})"),
+                  "cameras[0].size: expected");
+  expect_contains(problem("", R"({"name": "p", "monitor": "offscreen", "latency_ms": -3})"),
+                  "displays[0].latency_ms");
+  expect_contains(problem("", R"({"name": "p"})"), "displays[0].monitor: this key is missing");
+  expect_contains(problem(R"({"name": "a", "source": "x"}, {"name": "a", "source": "y"})"),
+                  "cameras[1]: expected a name");
+  expect_contains(
       problem(R"({"name": "a", "source": "v4l2:/dev/video0"}, {"name": "b", "source": "v4l2:/dev/video0"})"),
       "cameras[1]: expected a source of its own, found v4l2:/dev/video0, which a ");
-  contains(problem("", R"({"name": "p", "monitor": "HDMI-1"}, {"name": "q", "monitor": "HDMI-1"})"),
-           "displays[1]: expected a monitor of its own, found HDMI-1, which p ");
+  expect_contains(problem("", R"({"name": "p", "monitor": "HDMI-1"}, {"name": "q", "monitor": "HDMI-1"})"),
+                  "displays[1]: expected a monitor of its own, found HDMI-1, which p ");
   EXPECT_TRUE(loaded("", R"({"name": "p", "monitor": "window"}, {"name": "q", "monitor": "window"})"));
 }
 
@@ -97,14 +96,15 @@ TEST(Devices, OfAnotherRigAreRefusedAndNamed) {
     return fitted ? "fits" : fitted.message();
   };
   EXPECT_EQ(refused(camera0 + "," + camera1, projectors), "fits");
-  contains(refused(camera0, projectors), "cameras: expected the rig's camera1 among them");
-  contains(refused(camera0 + "," + camera1, R"({"name": "projector0", "monitor": "A"})"),
-           "the rig's projector1");
-  contains(refused(camera0 + "," + camera1 + R"(, {"name": "left", "source": "z"})", projectors),
-           "expected those of the rig (camera0, camera1), found left");
-  contains(refused(R"({"name": "camera0", "source": "x", "size": [640, 480]}, )" + camera1, projectors),
-           "camera0: expected the rig's size 1280x720, found 640x480");
-  contains(
+  expect_contains(refused(camera0, projectors), "cameras: expected the rig's camera1 among them");
+  expect_contains(refused(camera0 + "," + camera1, R"({"name": "projector0", "monitor": "A"})"),
+                  "the rig's projector1");
+  expect_contains(refused(camera0 + "," + camera1 + R"(, {"name": "left", "source": "z"})", projectors),
+                  "expected those of the rig (camera0, camera1), found left");
+  expect_contains(
+      refused(R"({"name": "camera0", "source": "x", "size": [640, 480]}, )" + camera1, projectors),
+      "camera0: expected the rig's size 1280x720, found 640x480");
+  expect_contains(
       refused(
           camera0 + "," + camera1,
           R"({"name": "projector0", "monitor": "A", "size": [1280, 800]}, {"name": "projector1", "monitor": "B"})"),

@@ -16,17 +16,15 @@
 
 #include "device/open_camera.h"
 #include "tests/support/matchers.h"
+#include "tests/support/text.h"
 
 namespace limn::device {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using test::expect_contains;
 
 constexpr const char* k_id = "Aravis-Fake-LIMN7";
-
-void contains(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
-}
 
 // The process of the fake camera. Killing it has the effect of an unplugged cable.
 class FakeCamera {
@@ -86,7 +84,7 @@ TEST(GigeCamera, DeliversFramesLockedAndStamped) {
   EXPECT_NEAR(settings[0].found.value_or(0), 20, 0.1);
   EXPECT_EQ(settings[1].problem, "");
   EXPECT_NEAR(settings[1].found.value_or(0), 3, 0.1);
-  contains(settings[2].problem, "white_balance_k");
+  expect_contains(settings[2].problem, "white_balance_k");
   // After a pause the reader gets the newest frame, not one of those that filled the buffers first.
   std::this_thread::sleep_for(std::chrono::milliseconds(1000));
   const Stamp begun = Clock::now();
@@ -103,7 +101,7 @@ TEST(GigeCamera, ARegionAndBrightnessAloneThroughOpenCamera) {
   auto camera = open_camera(wanted);
   ASSERT_TRUE(camera) << camera.message();
   EXPECT_EQ((*camera)->size(), cv::Size(320, 240));
-  contains((*camera)->description(), "Mono8 320x240");
+  expect_contains((*camera)->description(), "Mono8 320x240");
   const auto frame = (*camera)->next();
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(frame->image.type(), CV_8UC1);
@@ -128,12 +126,12 @@ TEST(GigeCamera, APulledCableIsNamedAndTheCameraComesBack) {
   }
   EXPECT_LT(seconds_between(begun, Clock::now()), 4) << "the limit plus the time of a search";
   ASSERT_FALSE(frame);
-  contains(frame.message(), "it sends no frame");
+  expect_contains(frame.message(), "it sends no frame");
   {
     const FakeCamera again;
     for (int i = 0; !frame && i < 15; ++i) frame = camera->next();
     EXPECT_TRUE(frame) << frame.message();
-    contains(camera->description(), "opened 2 times");
+    expect_contains(camera->description(), "opened 2 times");
   }
   begun = Clock::now();
   camera = error("left");
@@ -145,8 +143,8 @@ TEST(GigeCamera, NobodyIsNamed) {
   const Stamp begun = Clock::now();
   const auto camera = open_camera({.source = "gige:Nobody-1", .limit_s = 0.5});
   ASSERT_FALSE(camera);
-  contains(camera.message(), "gige:Nobody-1");
-  contains(camera.message(), "not found");
+  expect_contains(camera.message(), "gige:Nobody-1");
+  expect_contains(camera.message(), "not found");
   EXPECT_LT(seconds_between(begun, Clock::now()), 5);
 }
 

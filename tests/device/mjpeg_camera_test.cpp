@@ -11,27 +11,22 @@
 #include <utility>
 
 #include "tests/device/loopback_server.h"
+#include "tests/device/mjpeg_answer.h"
 #include "tests/support/matchers.h"
 
 namespace limn::device {
 namespace {
 
+using test::k_mjpeg_answer;
 using test::LoopbackClient;
 using test::LoopbackServer;
+using test::mjpeg_part;
 using Clock = std::chrono::steady_clock;
-
-constexpr const char* k_answer =
-    "HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n";
 
 std::string jpeg(int value, int width = 64) {
   std::vector<uchar> bytes;
   cv::imencode(".jpg", cv::Mat(48, width, CV_8UC3, cv::Scalar::all(value)), bytes);
   return {bytes.begin(), bytes.end()};
-}
-
-std::string part(const std::string& body) {
-  return fmt::format("--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n{}\r\n", body.size(),
-                     body);
 }
 
 void pause(int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); }
@@ -47,9 +42,9 @@ constexpr double k_clocks_apart_s = 1e-3;  // the kernel stamps by the wall cloc
 // Sends images of increasing brightness every 5 ms until the client closes the connection.
 void stream_well(LoopbackClient& client) {
   client.receive_until("\r\n\r\n");
-  bool there = client.send(k_answer);
+  bool there = client.send(k_mjpeg_answer);
   for (int i = 0; there; i = (i + 1) % 250) {
-    there = client.send(part(jpeg(i)));
+    there = client.send(mjpeg_part(jpeg(i)));
     pause(5);
   }
 }
@@ -60,9 +55,9 @@ TEST(MjpegCamera, DeliversImagesInOrderStampedOnArrival) {
   std::vector<Stamp> sent(200);
   LoopbackServer server([&](LoopbackClient& client) {
     asked = client.receive_until("\r\n\r\n");
-    client.send(k_answer);
+    client.send(k_mjpeg_answer);
     for (int i = 0; i < 200; ++i) {
-      const std::string bytes = part(jpeg(i));
+      const std::string bytes = mjpeg_part(jpeg(i));
       {
         const std::lock_guard lock(mutex);
         sent[static_cast<std::size_t>(i)] = Clock::now();
@@ -103,11 +98,11 @@ TEST(MjpegCamera, OldImagesThatWaitAreDropped) {
   Stamp last_sent;
   LoopbackServer server([&](LoopbackClient& client) {
     client.receive_until("\r\n\r\n");
-    client.send(k_answer);
-    while (!is_away && client.send(part(jpeg(0)))) pause(2);
+    client.send(k_mjpeg_answer);
+    while (!is_away && client.send(mjpeg_part(jpeg(0)))) pause(2);
     for (int i = 1; i <= 40; ++i) {
       pause(2);
-      const std::string bytes = part(jpeg(i));
+      const std::string bytes = mjpeg_part(jpeg(i));
       last_sent = Clock::now();
       client.send(bytes);
     }
@@ -148,9 +143,9 @@ struct Switched {
     server = std::make_unique<LoopbackServer>(
         [this](LoopbackClient& client) {
           client.receive_until("\r\n\r\n");
-          bool there = client.send(k_answer);
+          bool there = client.send(k_mjpeg_answer);
           while (there && on) {
-            there = client.send(part(jpeg(100)));
+            there = client.send(mjpeg_part(jpeg(100)));
             pause(5);
           }
         },
@@ -179,7 +174,7 @@ TEST(MjpegCamera, ReconnectsWhenTheServerComesBack) {
 TEST(MjpegCamera, ALostConnectionIsMendedInsideOneCall) {
   LoopbackServer server([](LoopbackClient& client) {  // one image, then the end
     client.receive_until("\r\n\r\n");
-    client.send(std::string(k_answer) + part(jpeg(50)) + "--frame--\r\n");
+    client.send(k_mjpeg_answer + mjpeg_part(jpeg(50)) + "--frame--\r\n");
   });
   auto camera = MjpegCamera::open(url(server));
   ASSERT_TRUE(camera) << camera.message();
@@ -195,7 +190,7 @@ std::string problem_after_one_image(const std::string& rest) {
   constexpr double k_limit_s = 1;
   LoopbackServer server([&, first = true](LoopbackClient& client) mutable {
     client.receive_until("\r\n\r\n");
-    bool there = client.send(std::string(k_answer) + (std::exchange(first, false) ? part(jpeg(50)) : ""));
+    bool there = client.send(k_mjpeg_answer + (std::exchange(first, false) ? mjpeg_part(jpeg(50)) : ""));
     pause(50);
     while (there && !rest.empty()) {
       there = client.send(rest);
@@ -217,20 +212,20 @@ TEST(MjpegCamera, FaultsAreNamed) {
     EXPECT_NE(message.find("camera0 (http://127.0.0.1:"), std::string::npos) << message;
   };
   const std::string half = jpeg(50).substr(0, jpeg(50).size() / 2);
-  contains(problem_after_one_image(part(half)), "truncated or damaged");
-  contains(problem_after_one_image(part(jpeg(50, 80))), "64x48, found 80x48");
+  contains(problem_after_one_image(mjpeg_part(half)), "truncated or damaged");
+  contains(problem_after_one_image(mjpeg_part(jpeg(50, 80))), "64x48, found 80x48");
   contains(problem_after_one_image("--other\r\n"), "expected the boundary \"--frame\"");
-  contains(problem_after_one_image(part(std::string(30000, 'x'))), "at most 20000 bytes");
+  contains(problem_after_one_image(mjpeg_part(std::string(30000, 'x'))), "at most 20000 bytes");
   contains(problem_after_one_image(""), "silent");
 }
 
 TEST(MjpegCamera, ADamagedImageAmongGoodOnesIsPassedOver) {
   LoopbackServer server([](LoopbackClient& client) {
     client.receive_until("\r\n\r\n");
-    bool there = client.send(k_answer);
+    bool there = client.send(k_mjpeg_answer);
     for (int i = 0; there; ++i) {
       const std::string image = jpeg(60);
-      there = client.send(part(i % 2 ? image.substr(0, image.size() / 2) : image));
+      there = client.send(mjpeg_part(i % 2 ? image.substr(0, image.size() / 2) : image));
       pause(5);
     }
   });

@@ -1,19 +1,17 @@
 #include "device/mjpeg_stream.h"
 
+#include "tests/device/mjpeg_answer.h"
 #include "tests/support/matchers.h"
+#include "tests/support/text.h"
 
 namespace limn::device {
 namespace {
 
+using test::expect_contains;
+using test::k_mjpeg_answer;
+using test::mjpeg_part;
+
 constexpr std::size_t k_limit = 1000;
-
-const std::string k_answer =
-    "HTTP/1.0 200 OK\r\nServer: test\r\nContent-Type: multipart/x-mixed-replace; boundary=frame\r\n\r\n";
-
-std::string part(const std::string& body) {
-  return fmt::format("--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n{}\r\n", body.size(),
-                     body);
-}
 
 std::string open_part(const std::string& body) {
   return "--frame\r\nContent-Type: image/jpeg\r\n\r\n" + body + "\r\n";
@@ -52,21 +50,21 @@ std::string problem_of(const std::string& bytes) {
 TEST(MjpegStream, ImagesComeOutHoweverTheBytesAreCut) {
   const std::string binary("\xff\xd8\r\n--fram\r\n\r\n\0\xff\xd9", 17);
   const std::vector<std::string> expected = {"first", binary, "third"};
-  const std::string lengths = k_answer + part("first") + part(binary) + part("third");
+  const std::string lengths = k_mjpeg_answer + mjpeg_part("first") + mjpeg_part(binary) + mjpeg_part("third");
   const std::string open =
-      k_answer + "\r\n" + open_part("first") + open_part(binary) + open_part("third") + "--frame";
+      k_mjpeg_answer + "\r\n" + open_part("first") + open_part(binary) + open_part("third") + "--frame";
   const std::string bare =
-      k_answer + "--frame\r\n\r\nfirst\r\n--frame\r\n\r\n" + binary + "\r\n" + part("third");
-  const std::string chunks = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_answer.substr(17) +
-                             chunked(lengths.substr(k_answer.size()), 7);
+      k_mjpeg_answer + "--frame\r\n\r\nfirst\r\n--frame\r\n\r\n" + binary + "\r\n" + mjpeg_part("third");
+  const std::string chunks = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_mjpeg_answer.substr(17) +
+                             chunked(lengths.substr(k_mjpeg_answer.size()), 7);
   for (const std::string& bytes : {lengths, open, bare, chunks})
     for (const std::size_t step : {1, 2, 3, 5}) EXPECT_EQ(images(bytes, step), expected) << step << bytes;
 }
 
 TEST(MjpegStream, OnlyTheNewestIsKeptAndItsFirstByteIsItsStamp) {
   MjpegStream stream(k_limit);
-  ASSERT_TRUE(stream.feed(k_answer + part("old") + part("older still"), at(10)));
-  const std::string last = part("newest");
+  ASSERT_TRUE(stream.feed(k_mjpeg_answer + mjpeg_part("old") + mjpeg_part("older still"), at(10)));
+  const std::string last = mjpeg_part("newest");
   ASSERT_TRUE(stream.feed(last.substr(0, last.size() - 8), at(20)));  // only the part's header
   ASSERT_TRUE(stream.feed(last.substr(last.size() - 8, 3), at(30)));
   EXPECT_EQ(stream.take_newest()->jpeg, "older still");
@@ -83,51 +81,52 @@ TEST(MjpegStream, BoundariesAsServersWriteThem) {
   for (const char* written : {"\"frame\"", "--frame", "frame; charset=x", " frame "}) {
     const std::string answer = fmt::format(
         "HTTP/1.0 200 OK\r\nContent-type: Multipart/x-mixed-replace;boundary={}\r\n\r\n", written);
-    EXPECT_EQ(images(answer + part("one"), 4), std::vector<std::string>{"one"}) << written;
+    EXPECT_EQ(images(answer + mjpeg_part("one"), 4), std::vector<std::string>{"one"}) << written;
   }
 }
 
 TEST(MjpegStream, WhatIsWrongIsNamed) {
-  const auto contains = [](const std::string& message, const std::string& part) {
-    EXPECT_NE(message.find(part), std::string::npos) << message;
-  };
-  contains(problem_of("SSH-2.0-OpenSSH\r\n\r\n"), "SSH-2.0");
-  contains(problem_of("HTTP/1.0 404 Not Found\r\n\r\n"), "404 Not Found");
-  contains(problem_of("HTTP/1.0 401 Unauthorized\r\n\r\n"), "NAME:PASSWORD");
-  contains(problem_of("HTTP/1.1 302 Found\r\nLocation: http://there/\r\n\r\n"), "http://there/");
-  contains(problem_of("HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n"), "text/html");
-  contains(problem_of("HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace\r\n\r\n"), "boundary");
-  contains(problem_of(k_answer + "--other\r\n"), "found \"--other\"");
-  contains(problem_of(k_answer + "--frame\r\nContent-Length: 2\r\n\r\nabc\r\n"), "found \"c\"");
-  contains(problem_of(k_answer + "--frame\r\nContent-Type: text/plain\r\n\r\n"), "text/plain");
-  contains(problem_of(k_answer + "--frame\r\nContent-Length: many\r\n\r\n"), "many");
-  contains(problem_of(k_answer + part("one") + "--frame--\r\n"), "ended the stream");
-  contains(problem_of("HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_answer.substr(17) + "zz\r\n"),
-           "zz");
+  expect_contains(problem_of("SSH-2.0-OpenSSH\r\n\r\n"), "SSH-2.0");
+  expect_contains(problem_of("HTTP/1.0 404 Not Found\r\n\r\n"), "404 Not Found");
+  expect_contains(problem_of("HTTP/1.0 401 Unauthorized\r\n\r\n"), "NAME:PASSWORD");
+  expect_contains(problem_of("HTTP/1.1 302 Found\r\nLocation: http://there/\r\n\r\n"), "http://there/");
+  expect_contains(problem_of("HTTP/1.0 200 OK\r\nContent-Type: text/html\r\n\r\n"), "text/html");
+  expect_contains(problem_of("HTTP/1.0 200 OK\r\nContent-Type: multipart/x-mixed-replace\r\n\r\n"),
+                  "boundary");
+  expect_contains(problem_of(k_mjpeg_answer + "--other\r\n"), "found \"--other\"");
+  expect_contains(problem_of(k_mjpeg_answer + "--frame\r\nContent-Length: 2\r\n\r\nabc\r\n"), "found \"c\"");
+  expect_contains(problem_of(k_mjpeg_answer + "--frame\r\nContent-Type: text/plain\r\n\r\n"), "text/plain");
+  expect_contains(problem_of(k_mjpeg_answer + "--frame\r\nContent-Length: many\r\n\r\n"), "many");
+  expect_contains(problem_of(k_mjpeg_answer + mjpeg_part("one") + "--frame--\r\n"), "ended the stream");
+  expect_contains(
+      problem_of("HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_mjpeg_answer.substr(17) + "zz\r\n"),
+      "zz");
 }
 
 TEST(MjpegStream, MemoryStaysBoundedWhateverIsSent) {
   const std::string many(40000, 'x');
-  EXPECT_NE(problem_of(k_answer + "--frame\r\nContent-Length: 1001\r\n\r\n").find("at most 1000"),
+  EXPECT_NE(problem_of(k_mjpeg_answer + "--frame\r\nContent-Length: 1001\r\n\r\n").find("at most 1000"),
             std::string::npos);
-  EXPECT_NE(problem_of(k_answer + open_part(many)).find("at most 1000"), std::string::npos);
+  EXPECT_NE(problem_of(k_mjpeg_answer + open_part(many)).find("at most 1000"), std::string::npos);
   EXPECT_NE(problem_of("HTTP/1.0 200 OK\r\nX: " + many).find("header"), std::string::npos);
-  EXPECT_NE(problem_of(k_answer + many).find("boundary"), std::string::npos);
-  EXPECT_NE(problem_of(k_answer + "--frame\r\nX: " + many).find("header"), std::string::npos);
+  EXPECT_NE(problem_of(k_mjpeg_answer + many).find("boundary"), std::string::npos);
+  EXPECT_NE(problem_of(k_mjpeg_answer + "--frame\r\nX: " + many).find("header"), std::string::npos);
 }
 
 TEST(MjpegStream, ImagesBeforeAFaultAreGood) {
   Status end;
-  EXPECT_EQ(images(k_answer + part("good") + "--wrong\r\n", 500, &end), std::vector<std::string>{"good"});
+  EXPECT_EQ(images(k_mjpeg_answer + mjpeg_part("good") + "--wrong\r\n", 500, &end),
+            std::vector<std::string>{"good"});
   EXPECT_FALSE(end);
 }
 
 // Streams with random damage: every result is an image or an error.
 TEST(MjpegStream, DamagedStreamsNeverBreakIt) {
   auto rng = test::test_rng();
-  const std::string lengths = k_answer + part("first") + open_part("second") + part("third");
-  const std::string chunks = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_answer.substr(17) +
-                             chunked(lengths.substr(k_answer.size()), 9);
+  const std::string lengths =
+      k_mjpeg_answer + mjpeg_part("first") + open_part("second") + mjpeg_part("third");
+  const std::string chunks = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_mjpeg_answer.substr(17) +
+                             chunked(lengths.substr(k_mjpeg_answer.size()), 9);
   int refused = 0;
   for (int run = 0; run < 20000; ++run) {
     std::string bytes = run % 2 ? chunks : lengths;

@@ -14,6 +14,7 @@
 #include "device/open_display.h"
 #include "device/window.h"
 #include "tests/support/matchers.h"
+#include "tests/support/text.h"
 
 // Included last, because it defines macros such as None and Status.
 #include <X11/Xlib.h>
@@ -26,10 +27,7 @@ namespace limn::device {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-void contains(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
-}
+using test::expect_contains;
 
 // Quarters in red, green, blue and grey, with a white pixel in the top left and the bottom right corner.
 cv::Mat quarters(cv::Size size, int grey) {
@@ -97,7 +95,7 @@ TEST_F(AMonitor, IsListedAndADesktopIsTheOnlyOne) {
   EXPECT_FALSE(desktop_->find("nowhere"));
   const auto second = Desktop::open();
   ASSERT_FALSE(second);
-  contains(second.message(), "Pass that one on");
+  expect_contains(second.message(), "Pass that one on");
   EXPECT_FALSE(Window::open("Limn", 32, 32));
   desktop_.reset();
   const auto again = Desktop::open();
@@ -155,16 +153,16 @@ TEST_F(AMonitor, AndAWindowAreOpenedByName) {
 TEST_F(AMonitor, OfAnotherNameOrSizeIsRefused) {
   const auto unknown = MonitorDisplay::open(*desktop_, {.name = "left", .monitor = "HDMI-9"});
   ASSERT_FALSE(unknown);
-  contains(unknown.message(), "left: expected the monitor HDMI-9, found " + first_.name);
+  expect_contains(unknown.message(), "left: expected the monitor HDMI-9, found " + first_.name);
   const auto other = MonitorDisplay::open(*desktop_, {.monitor = first_.name, .size = {1111, 999}});
   ASSERT_FALSE(other);
-  contains(other.message(),
-           fmt::format("mode 1111x999, found it in {}x{}", first_.size.width, first_.size.height));
+  expect_contains(other.message(),
+                  fmt::format("mode 1111x999, found it in {}x{}", first_.size.width, first_.size.height));
   auto display = MonitorDisplay::open(*desktop_, {.monitor = first_.name});
   ASSERT_TRUE(display) << display.message();
   const auto small = display->show(cv::Mat(20, 30, CV_8UC3, cv::Scalar()));
   ASSERT_FALSE(small);
-  contains(small.message(), "found 30x20");
+  expect_contains(small.message(), "found 30x20");
   EXPECT_FALSE(display->show(cv::Mat(first_.size, CV_16UC1, cv::Scalar())));
 }
 
@@ -223,8 +221,8 @@ TEST_F(SeveralMonitors, AnUnpluggedOneIsNamedShowsNowhereAndComesBack) {
     gone = b.show(right);
   }
   ASSERT_FALSE(gone);
-  contains(gone.message(),
-           "on DUMMY1: expected the monitor DUMMY1, found DUMMY0 (1280x800) DUMMY2 (1024x768)");
+  expect_contains(gone.message(),
+                  "on DUMMY1: expected the monitor DUMMY1, found DUMMY0 (1280x800) DUMMY2 (1024x768)");
   EXPECT_TRUE(shows(&a, left, {0, 0}));
   xrandr("--output DUMMY1 --mode 1024x768 --pos 0x800");  // plugged in at another position
   auto back = b.show(right);
@@ -248,7 +246,7 @@ TEST_F(SeveralMonitors, AnotherModeIsRefusedUntilTheRigsIsBack) {
     other = b.show(right);
   }
   ASSERT_FALSE(other);
-  contains(other.message(), "in the rig's mode 1024x768, found it in 800x600");
+  expect_contains(other.message(), "in the rig's mode 1024x768, found it in 800x600");
   EXPECT_GT(desktop_->find("DUMMY1")->largest.area(), 800 * 600);
   xrandr("--output DUMMY1 --mode 1024x768 --pos 1280x0");
   auto back = b.show(right);

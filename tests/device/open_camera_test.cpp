@@ -5,15 +5,13 @@
 
 #include "core/image_io.h"
 #include "tests/support/matchers.h"
+#include "tests/support/text.h"
 
 namespace limn::device {
 namespace {
 
 namespace fs = std::filesystem;
-
-void contains(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
-}
+using test::expect_contains;
 
 TEST(OpenCamera, ImagesFoldersAndVideosByTheirPath) {
   const fs::path folder = test::test_folder();
@@ -38,23 +36,23 @@ TEST(OpenCamera, AnUnknownSourceListsTheForms) {
     const auto camera = open_camera({.name = "left", .source = source});
     ASSERT_FALSE(camera);
     for (const char* form : {"left: ", "http://", "rtsp://", "folder of images"})
-      contains(camera.message(), form);
+      expect_contains(camera.message(), form);
   }
 }
 
 TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
   const auto mjpeg = open_camera({.source = "http://127.0.0.1:1/x", .limit_s = 0.1});
   ASSERT_FALSE(mjpeg);
-  contains(mjpeg.message(), "http://127.0.0.1:1/x): expected an image");
+  expect_contains(mjpeg.message(), "http://127.0.0.1:1/x): expected an image");
   const auto secure = open_camera({.source = "https://127.0.0.1/x", .limit_s = 0.1});
   ASSERT_FALSE(secure);
-  contains(secure.message(), "as http://");
+  expect_contains(secure.message(), "as http://");
   const auto rtsp = open_camera({.source = "rtsp://127.0.0.1:1/x", .limit_s = 0.1});
   ASSERT_FALSE(rtsp);
   const auto v4l2 = open_camera({.source = "v4l2:/dev/nowhere", .sensor = {.gain = 1}, .limit_s = 0.1});
   ASSERT_FALSE(v4l2);
-  contains(v4l2.message(), "camera0 (/dev/nowhere): expected an image");
-  contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected an image");
+  expect_contains(v4l2.message(), "camera0 (/dev/nowhere): expected an image");
+  expect_contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected an image");
 }
 
 TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {
@@ -62,10 +60,10 @@ TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {
   ASSERT_TRUE(write_png(image, cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
   const auto set = open_camera({.source = image.string(), .sensor = {.exposure_ms = 8}});
   ASSERT_FALSE(set);
-  contains(set.message(), "exposure_ms cannot be set");
+  expect_contains(set.message(), "exposure_ms cannot be set");
   const auto other = open_camera({.source = image.string(), .size = {640, 480}});
   ASSERT_FALSE(other);
-  contains(other.message(), "expected 640x480, found 8x6");
+  expect_contains(other.message(), "expected 640x480, found 8x6");
 }
 
 }  // namespace

@@ -15,11 +15,13 @@
 #include <set>
 
 #include "tests/support/matchers.h"
+#include "tests/support/text.h"
 
 namespace limn::device {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+using test::expect_contains;
 
 struct Shot {
   std::vector<std::uint8_t> bytes;
@@ -208,10 +210,6 @@ Result<V4l2Camera> opened(Driver* driver, V4l2CameraOptions options = {}) {
   return V4l2Camera::open("/dev/video2", options, driver->system());
 }
 
-void contains(const std::string& message, const std::string& part) {
-  EXPECT_NE(message.find(part), std::string::npos) << part << " in: " << message;
-}
-
 // The error message of opening the camera.
 std::string problem(Driver* driver, const V4l2CameraOptions& options = {}) {
   const auto camera = opened(driver, options);
@@ -227,7 +225,7 @@ TEST(V4l2Camera, DecodesMjpgYuyvAndGrey) {
   auto camera = opened(&driver, {.name = "left", .size = {64, 48}});
   ASSERT_TRUE(camera) << camera.message();
   EXPECT_EQ(camera->size(), cv::Size(64, 48));
-  contains(camera->description(), "MJPG 64x48");
+  expect_contains(camera->description(), "MJPG 64x48");
   auto frame = camera->next();
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_EQ(frame->camera, "left");
@@ -284,7 +282,7 @@ TEST(V4l2Camera, TheNewestFrameIsKeptAndStampedAtTheMiddleOfItsExposure) {
   EXPECT_TRUE(is_between(frame->captured_at, begun, -0.05 + 0.04));
   EXPECT_NEAR(frame->image.ptr()[0], 40, 2);
   EXPECT_EQ(driver.queued.size(), 4u);  // the driver has all buffers again
-  contains(camera->description(), "2 frames skipped");
+  expect_contains(camera->description(), "2 frames skipped");
 
   driver.shots.push_back(mjpg(50));  // its stamp is the end of the exposure
   driver.shots.back().flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_EOF;
@@ -306,7 +304,7 @@ TEST(V4l2Camera, WhereAllBuffersWereFilledTheNextFrameIsTheNewest) {
   ASSERT_TRUE(frame) << frame.message();
   EXPECT_NEAR(frame->image.ptr()[0], 90, 2);
   EXPECT_EQ(driver.queued.size(), 4u);
-  contains(camera->description(), "4 frames skipped");
+  expect_contains(camera->description(), "4 frames skipped");
 }
 
 TEST(V4l2Camera, StampsThatCannotBeAreThoseOfReading) {
@@ -326,7 +324,7 @@ TEST(V4l2Camera, StampsThatCannotBeAreThoseOfReading) {
     EXPECT_GE(frame->captured_at, begun);
     EXPECT_LE(frame->captured_at, Clock::now());
   }
-  contains(camera->description(), "3 with an impossible stamp");
+  expect_contains(camera->description(), "3 with an impossible stamp");
 }
 
 TEST(V4l2Camera, SensorSettingsAreLockedAndReadBack) {
@@ -357,37 +355,38 @@ TEST(V4l2Camera, WhatTheDriverDidNotDoIsSaid) {
   };
   Driver coarse;
   coarse.exposure_step = 50;
-  contains(said(&coarse, wanted), "asked for 8, the driver says 5. It takes 0.3 to 500 in steps of 0.1");
+  expect_contains(said(&coarse, wanted),
+                  "asked for 8, the driver says 5. It takes 0.3 to 500 in steps of 0.1");
   Driver refusing;
-  contains(said(&refusing, {.exposure_ms = 900}),
-           "exposure_ms is refused (Numerical result out of range). It takes");
+  expect_contains(said(&refusing, {.exposure_ms = 900}),
+                  "exposure_ms is refused (Numerical result out of range). It takes");
   Driver without;
   without.controls.erase(V4L2_CID_GAIN);
-  contains(said(&without, {.gain = 3}), "no such control");
+  expect_contains(said(&without, {.gain = 3}), "no such control");
   Driver stubborn;
   stubborn.stuck = {V4L2_CID_EXPOSURE_AUTO};
-  contains(said(&stubborn, wanted), "own control of it stays on");
+  expect_contains(said(&stubborn, wanted), "own control of it stays on");
   Driver mute;
   mute.refusals = {{VIDIOC_G_CTRL, EIO}};
-  contains(said(&mute, wanted), "cannot be read back");
+  expect_contains(said(&mute, wanted), "cannot be read back");
 }
 
 TEST(V4l2Camera, ADriverThatLiesAboutItsFormatIsNamed) {
   Driver smaller;
   smaller.on_set = [](v4l2_pix_format* format) { format->width = 32; };
-  contains(problem(&smaller, {.size = {64, 48}}),
-           "expected the format MJPG 64x48, the driver offers MJPG 32x48");
+  expect_contains(problem(&smaller, {.size = {64, 48}}),
+                  "expected the format MJPG 64x48, the driver offers MJPG 32x48");
   Driver other;
   other.on_set = [](v4l2_pix_format* format) { format->pixelformat = V4L2_PIX_FMT_YUYV; };
-  contains(problem(&other), "the driver offers YUYV");
+  expect_contains(problem(&other), "the driver offers YUYV");
   Driver forgetful;
   forgetful.on_get = [asked = 0](v4l2_pix_format* format) mutable {
     if (++asked % 2 == 0) format->height = 40;
   };
-  contains(problem(&forgetful), "then says MJPG 64x40");
+  expect_contains(problem(&forgetful), "then says MJPG 64x40");
   Driver larger;  // the JPEG has another size than the format
   larger.last = mjpg(10, 80);
-  contains(problem(&larger), "64x48, found 80x48");
+  expect_contains(problem(&larger), "64x48, found 80x48");
 }
 
 TEST(V4l2Camera, FaultsAreNamedWithWhatToDo) {
@@ -397,37 +396,38 @@ TEST(V4l2Camera, FaultsAreNamedWithWhatToDo) {
     driver.refusals[request] = reason;
     return problem(&driver);
   };
-  contains(refusing(VIDIOC_STREAMON, ENOSPC), "USB controller");
-  contains(refusing(VIDIOC_REQBUFS, EBUSY), "other program");
-  contains(refusing(VIDIOC_DQBUF, EIO), "taking a frame fails: Input/output error");
-  contains(refusing(VIDIOC_QUERYBUF, EINVAL), "asking for a buffer fails");
-  contains(refusing(VIDIOC_S_FMT, EBUSY), "setting its format fails");
+  expect_contains(refusing(VIDIOC_STREAMON, ENOSPC), "USB controller");
+  expect_contains(refusing(VIDIOC_REQBUFS, EBUSY), "other program");
+  expect_contains(refusing(VIDIOC_DQBUF, EIO), "taking a frame fails: Input/output error");
+  expect_contains(refusing(VIDIOC_QUERYBUF, EINVAL), "asking for a buffer fails");
+  expect_contains(refusing(VIDIOC_S_FMT, EBUSY), "setting its format fails");
   Driver metadata;
   metadata.capabilities = V4L2_CAP_META_CAPTURE | V4L2_CAP_STREAMING;
-  contains(problem(&metadata), "gives no images");
+  expect_contains(problem(&metadata), "gives no images");
   Driver exotic;
   exotic.formats = {V4L2_PIX_FMT_H264};
-  contains(problem(&exotic), "expected a camera with MJPG, YUYV or GREY, found H264");
+  expect_contains(problem(&exotic), "expected a camera with MJPG, YUYV or GREY, found H264");
   Driver forbidden;
   forbidden.open_problem = EACCES;
-  contains(problem(&forbidden), "group video");
+  expect_contains(problem(&forbidden), "group video");
   Driver silent;
-  contains(problem(&silent), "sends no frame");
+  expect_contains(problem(&silent), "sends no frame");
   Driver few;
   few.buffer_count = 1;
-  contains(problem(&few), "expected 4 buffers, the driver gives 1");
+  expect_contains(problem(&few), "expected 4 buffers, the driver gives 1");
   Driver narrow;
   narrow.formats = {V4L2_PIX_FMT_YUYV};
   narrow.buffer_bytes = 6000;
-  contains(problem(&narrow), "expected buffers of at least 6144 bytes for YUYV 64x48, the driver gives 6000");
+  expect_contains(problem(&narrow),
+                  "expected buffers of at least 6144 bytes for YUYV 64x48, the driver gives 6000");
   Driver wild;
   wild.last = mjpg(10);
   wild.odd_index = 9;
-  contains(problem(&wild), "the buffer 9 of 4");
+  expect_contains(problem(&wild), "the buffer 9 of 4");
   const auto absent = V4l2Camera::open("/dev/video5", {.limit_s = 0.1}, few.system());
   ASSERT_FALSE(absent);
-  contains(absent.message(), "camera0 (/dev/video5)");
-  contains(absent.message(), "Plug the camera in");
+  expect_contains(absent.message(), "camera0 (/dev/video5)");
+  expect_contains(absent.message(), "Plug the camera in");
 }
 
 TEST(V4l2Camera, DamagedAndShortFramesArePassedOver) {
@@ -444,8 +444,8 @@ TEST(V4l2Camera, DamagedAndShortFramesArePassedOver) {
     driver.last = bad;
     const auto none = camera->next();
     ASSERT_FALSE(none);
-    contains(none.message(),
-             bad.flags & V4L2_BUF_FLAG_ERROR ? "marks its frames as damaged" : "at least 6144 bytes");
+    expect_contains(none.message(),
+                    bad.flags & V4L2_BUF_FLAG_ERROR ? "marks its frames as damaged" : "at least 6144 bytes");
     driver.last = yuyv(100);
     EXPECT_TRUE(camera->next());
   }
@@ -461,7 +461,7 @@ TEST(V4l2Camera, APulledPlugIsNamedAndTheCameraComesBack) {
   driver.open_problem = ENOENT;
   const auto gone = camera->next();
   ASSERT_FALSE(gone);
-  contains(gone.message(), "opening it fails: No such file or directory");
+  expect_contains(gone.message(), "opening it fails: No such file or directory");
   EXPECT_EQ(driver.mapped, 0);
   EXPECT_EQ(camera->settings().size(), 0u);
   driver.refusals.clear();
@@ -471,7 +471,7 @@ TEST(V4l2Camera, APulledPlugIsNamedAndTheCameraComesBack) {
   for (int i = 0; !back && i < 8; ++i) back = camera->next();
   ASSERT_TRUE(back) << back.message();
   EXPECT_EQ(driver.controls[V4L2_CID_EXPOSURE_ABSOLUTE], 80);
-  contains(camera->description(), "opened 2 times");
+  expect_contains(camera->description(), "opened 2 times");
 
   driver.refusals[VIDIOC_DQBUF] = ENODEV;  // then another camera has the same path
   driver.on_set = [](v4l2_pix_format* format) { format->width = 32; };
@@ -480,7 +480,7 @@ TEST(V4l2Camera, APulledPlugIsNamedAndTheCameraComesBack) {
   Result<Frame> other = camera->next();
   for (int i = 0; i < 3; ++i) other = camera->next();
   ASSERT_FALSE(other);
-  contains(other.message(), "expected the format MJPG 64x48, the driver offers MJPG 32x48");
+  expect_contains(other.message(), "expected the format MJPG 64x48, the driver offers MJPG 32x48");
 }
 
 TEST(V4l2Camera, CamerasAreListed) {
@@ -495,7 +495,7 @@ TEST(V4l2Camera, CamerasAreListed) {
   driver.open_problem = EACCES;
   found = v4l2_cameras(driver.system());
   ASSERT_EQ(found.size(), 1u);
-  contains(found[0].problem, "group video");
+  expect_contains(found[0].problem, "group video");
   EXPECT_EQ(driver.opened, driver.closed);
 }
 

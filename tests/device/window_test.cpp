@@ -6,15 +6,14 @@
 #include <opencv2/core.hpp>
 
 #include "device/gl_context.h"
+#include "tests/support/display.h"
 #include "tests/support/matchers.h"
 
 namespace limn::device {
 namespace {
 
-bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
-
 TEST(Window, ShowsAnImageAndGivesTheContextBack) {
-  if (!has_display()) GTEST_SKIP() << "no display: Window.ShowsAPictureAndGivesTheContextBack";
+  if (!test::has_desktop()) GTEST_SKIP() << "no display: Window.ShowsAPictureAndGivesTheContextBack";
   const auto context = GlContext::create();
   ASSERT_TRUE(context) << context.message();
   auto window = Window::open("Limn", 320, 240);
@@ -38,7 +37,7 @@ TEST(Window, ShowsAnImageAndGivesTheContextBack) {
 }
 
 TEST(Window, WithoutADisplayTheErrorSaysSo) {
-  if (has_display()) GTEST_SKIP() << "a display is there: Window.WithoutADisplayTheErrorSaysSo";
+  if (test::has_desktop()) GTEST_SKIP() << "a display is there: Window.WithoutADisplayTheErrorSaysSo";
   const auto window = Window::open("Limn", 320, 240);
   ASSERT_FALSE(window);
   EXPECT_NE(window.message().find("display"), std::string::npos) << window.message();

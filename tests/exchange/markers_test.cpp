@@ -11,6 +11,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 #include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
@@ -130,7 +131,7 @@ TEST(Markers, LearnABodyFromItsImages) {
   }
   const Status status = run_learn_body(options);
   ASSERT_TRUE(status) << status.message();
-  const auto body = nlohmann::json::parse(read_file(options.out).value());
+  const auto body = test::read_json(options.out);
   EXPECT_EQ(body["schema"], "limn.body/1");
   EXPECT_EQ(body["pictures"], 8);
   ASSERT_EQ(body["markers"].size(), 4u);

@@ -1,5 +1,5 @@
 // Tests the dependencies in docs/architecture.md: which room may include which, and that no folders include
-// each other in a circle.
+// each other in a circle. Also the sizes and words of docs/style.md.
 
 #include <gtest/gtest.h>
 
@@ -11,6 +11,7 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -304,6 +305,40 @@ TEST(House, HeadersKeepSlowThirdPartiesOut) {
       EXPECT_FALSE(include.what.starts_with(slow)) << include.file << " includes " << include.what;
     }
   }
+}
+
+// ---- tests ----
+
+// The lines of each TEST in a file, from its name to the brace that ends it.
+std::map<std::string, int> lines_of_tests(std::istream& file) {
+  static const std::regex begin(R"(^(TEST(?:_F|_P)?\([^)]*).*)");
+  std::map<std::string, int> lines;
+  std::string test;
+  for (std::string line; std::getline(file, line);) {
+    std::smatch match;
+    if (std::regex_match(line, match, begin)) test = match[1].str() + ")";
+    if (!test.empty()) ++lines[test];
+    if (line == "}" || line.ends_with(") {}")) test.clear();
+  }
+  return lines;
+}
+
+TEST(House, TheLinesOfATestAreCounted) {
+  std::istringstream file("int a() {\n}\n\nTEST(A, B) {\n  a();\n}\n\n// c\nTEST_F(D, E) {}\n");
+  EXPECT_EQ(lines_of_tests(file), (std::map<std::string, int>{{"TEST(A, B)", 3}, {"TEST_F(D, E)", 1}}));
+}
+
+TEST(House, NoTestIsLongerThanAScreen) {
+  constexpr int k_most = 80;  // docs/style.md
+  std::size_t seen = 0;
+  for (const fs::path& path : code_in(root() / "tests")) {
+    std::ifstream file(path);
+    const auto tests = lines_of_tests(file);
+    seen += tests.size();
+    for (const auto& [test, lines] : tests)
+      EXPECT_LE(lines, k_most) << fs::relative(path, root()) << ": cut " << test << " at its scenarios";
+  }
+  EXPECT_GT(seen, 1000u) << "the tests were not found";
 }
 
 // ---- words ----

@@ -12,6 +12,7 @@
 
 #include "device/gl_context.h"
 #include "projector/renderer.h"
+#include "tests/support/meshes.h"
 
 namespace {
 // Counted for this thread only, because drivers have threads of their own.
@@ -38,35 +39,14 @@ void operator delete(void* memory, std::size_t) noexcept { returned(memory); }
 namespace limn::projector {
 namespace {
 
-using Eigen::Vector3d;
-
-scene::Mesh grid(double width, double height, double z, int cells) {
-  scene::Mesh mesh;
-  for (int row = 0; row <= cells; ++row)
-    for (int column = 0; column <= cells; ++column) {
-      mesh.positions.push_back(
-          Vector3d((1.0 * column / cells - 0.5) * width, (1.0 * row / cells - 0.5) * height, z)
-              .cast<float>());
-      mesh.normals.push_back(-Eigen::Vector3f::UnitZ());
-    }
-  const auto at = [&](int column, int row) { return static_cast<std::uint32_t>(row * (cells + 1) + column); };
-  for (int row = 0; row < cells; ++row)
-    for (int column = 0; column < cells; ++column) {
-      mesh.triangles.push_back({at(column, row), at(column, row + 1), at(column + 1, row)});
-      mesh.triangles.push_back({at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)});
-    }
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  return mesh;
-}
-
 scene::Scene scene_of(int cells) {
   scene::Scene scene;
-  scene.prototype = scene::Prototype{grid(0.5, 0.4, 0, cells), {}, 0.8, {}};
+  scene.prototype = scene::Prototype{test::sheet(0.5, 0.4, 0, cells), {}, 0.8, {}};
   for (const auto& [name, mode] : {std::pair("mirror", scene::Mode::view), {"trim", scene::Mode::surface}}) {
     scene::Slot slot;
     slot.name = name;
     slot.mode = mode;
-    slot.variants.push_back({"a", grid(0.1, 0.1, mode == scene::Mode::view ? -0.03 : 0, 4)});
+    slot.variants.push_back({"a", test::sheet(0.1, 0.1, mode == scene::Mode::view ? -0.03 : 0, 4)});
     scene.slots.push_back(slot);
   }
   return scene;

@@ -9,6 +9,7 @@
 #include "projector/renderer.h"
 #include "scene/tangents.h"
 #include "tests/projector/gl_test.h"
+#include "tests/support/meshes.h"
 
 namespace limn::projector {
 namespace {
@@ -17,17 +18,8 @@ using Eigen::Vector3d;
 
 const Vector3d k_up(0, -1, 0);
 
-// A rectangle at z, seen from -z.
 scene::Mesh sheet(double width, double height, double z) {
-  scene::Mesh mesh;
-  for (const double y : {-0.5, 0.5})
-    for (const double x : {-0.5, 0.5}) {
-      mesh.positions.push_back(Vector3d(x * width, y * height, z).cast<float>());
-      mesh.normals.push_back(-Eigen::Vector3f::UnitZ());
-      mesh.uvs.push_back(Eigen::Vector2d(x + 0.5, 0.5 - y).cast<float>());
-    }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}};
-  mesh.triangle_materials = {0, 0};
+  scene::Mesh mesh = test::textured_sheet(width, height, z);
   mesh.materials[0].unlit = true;
   mesh.materials[0].base_colour = {0.5f, 0.5f, 0.5f};
   return mesh;

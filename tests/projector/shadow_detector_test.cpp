@@ -14,22 +14,12 @@
 #include "tests/projector/gl_test.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
+#include "tests/support/meshes.h"
 
 namespace limn::projector {
 namespace {
 
 using Eigen::Vector3d;
-
-scene::Mesh sheet(double width, double height) {
-  scene::Mesh mesh;
-  for (const auto& [x, y] : {std::pair(-0.5, -0.5), {0.5, -0.5}, {0.5, 0.5}, {-0.5, 0.5}}) {
-    mesh.positions.push_back(Vector3d(x * width, y * height, 0).cast<float>());
-    mesh.normals.emplace_back(0, 0, -1);
-  }
-  mesh.triangles = {{0, 2, 1}, {0, 3, 2}};
-  mesh.triangle_materials = {0, 0};
-  return mesh;
-}
 
 class ArrivingTest : public test::GlTest {};
 
@@ -43,7 +33,7 @@ TEST_F(ArrivingTest, OthersGiveTheLightOfABlockedProjector) {
                               Pose(Eigen::Quaterniond::Identity(), -Vector3d(x, 0, -1))});
   }
   scene::Scene scene;
-  scene.prototype = scene::Prototype{sheet(1.1, 0.7), {}, 0.8, {}};
+  scene.prototype = scene::Prototype{test::sheet(1.1, 0.7, 0, 1), {}, 0.8, {}};
   const scene::PosedScene posed{Pose(), {}};
   auto drawing = Renderer::create(scene, rig);
   ASSERT_TRUE(drawing) << drawing.message();
@@ -111,18 +101,18 @@ class Room {
     world.objects.clear();
     sim::Object wall;
     wall.name = "prototype";
-    wall.mesh = std::make_shared<scene::Mesh>(sheet(0.5, 0.36));
+    wall.mesh = std::make_shared<scene::Mesh>(test::sheet(0.5, 0.36, 0, 1));
     wall.world_from_object = world.world_from_prototype;
     wall.albedo = {0.35, 0.5, 0.7};
     world.objects.push_back(wall);
-    scene.prototype = scene::Prototype{sheet(0.5, 0.36), {}, 0.6, {}};
+    scene.prototype = scene::Prototype{test::sheet(0.5, 0.36, 0, 1), {}, 0.6, {}};
     add_part("coat", 0.5, 0.36);
     add_part("patch", 0.12, 0.12);
     seed = test::test_rng()();
   }
 
   void add_part(const char* name, double width, double height) {
-    scene::Mesh mesh = sheet(width, height);
+    scene::Mesh mesh = test::sheet(width, height, 0, 1);
     mesh.materials = {
         scene::Material{.base_colour = Eigen::Vector3f::Constant(0.4F), .unlit = true, .texture = {}}};
     scene::Slot slot;

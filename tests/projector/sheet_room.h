@@ -13,6 +13,7 @@
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "tests/projector/gl_test.h"
+#include "tests/support/meshes.h"
 
 namespace limn::projector {
 
@@ -22,33 +23,14 @@ using scene::Mesh;
 using scene::PosedScene;
 using scene::Scene;
 using scene::Slot;
+using test::grid;
 
 // The room: the prototype's front faces -z, where projectors, viewer and camera stand.
 inline const Vector3d k_up(0, -1, 0);
 
-inline Mesh grid(int columns, int rows, const std::function<Vector3d(double, double)>& at) {
-  Mesh mesh;
-  for (int r = 0; r <= rows; ++r) {
-    for (int c = 0; c <= columns; ++c) {
-      mesh.positions.push_back(at(1.0 * c / columns, 1.0 * r / rows).cast<float>());
-      mesh.normals.push_back(Eigen::Vector3f(0, 0, -1));
-    }
-  }
-  const auto index = [&](int c, int r) { return static_cast<std::uint32_t>(r * (columns + 1) + c); };
-  for (int r = 0; r < rows; ++r) {
-    for (int c = 0; c < columns; ++c) {
-      mesh.triangles.push_back({index(c, r), index(c, r + 1), index(c + 1, r)});
-      mesh.triangles.push_back({index(c + 1, r), index(c, r + 1), index(c + 1, r + 1)});
-    }
-  }
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  return mesh;
-}
-
 // A rectangle in a plane of constant z; its middle is on the z axis.
 inline Mesh sheet(double width, double height, double z = 0, int cells = 7) {
-  return grid(cells, cells,
-              [=](double u, double v) { return Vector3d((u - 0.5) * width, (v - 0.5) * height, z); });
+  return test::sheet(width, height, z, cells);
 }
 
 inline Mesh coloured(Mesh mesh, const Eigen::Vector3f& colour, bool unlit = true) {

@@ -10,6 +10,7 @@
 #include "projector/renderer.h"
 #include "tests/projector/gl_test.h"
 #include "tests/support/matchers.h"
+#include "tests/support/meshes.h"
 
 namespace limn::projector {
 namespace {
@@ -27,18 +28,7 @@ Vector3d pattern_rgb(double x, double y) {
   return {0.4 + 0.25 * a, 0.4 + 0.25 * b, 0.4 + 0.12 * (a + b)};
 }
 
-scene::Mesh sheet(const double (&sides)[2], double z) {
-  scene::Mesh mesh;
-  for (const double y : {-0.5, 0.5})
-    for (const double x : {-0.5, 0.5}) {
-      mesh.positions.push_back(Vector3d(x * sides[0], y * sides[1], z).cast<float>());
-      mesh.normals.push_back(-Eigen::Vector3f::UnitZ());
-      mesh.uvs.push_back(Eigen::Vector2d(x + 0.5, 0.5 - y).cast<float>());
-    }
-  mesh.triangles = {{0, 2, 1}, {1, 2, 3}};
-  mesh.triangle_materials = {0, 0};
-  return mesh;
-}
+scene::Mesh sheet(const double (&sides)[2], double z) { return test::textured_sheet(sides[0], sides[1], z); }
 
 // The pattern as an image: linear light, CV_32FC3 BGR.
 cv::Mat pattern_image() {

@@ -6,13 +6,13 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <set>
 #include <thread>
 
 #include "apps/replay.h"
 #include "core/file.h"
 #include "core/image_io.h"
-#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/image_sequence_camera.h"
 #include "device/jpeg.h"
@@ -26,7 +26,7 @@
 #include "tests/remote/remote_client.h"
 #include "tests/support/clicker.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/worlds.h"
 
 namespace limn::remote {
 namespace {
@@ -152,8 +152,7 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
 // Brightness by JPEG itself is not what its colours make of it.
 TEST(Recorder, AFrameIsReadAsItWasWatched) {
   const fs::path folder = test::test_folder();
-  const sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+  const sim::World world = test::studio_world();
   apps::SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
@@ -181,9 +180,7 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
 // threads ran.
 TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const fs::path folder = test::test_folder();
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
-  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
+  sim::World world = test::studio_world(0.5);
   apps::SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
@@ -285,12 +282,21 @@ class RoomProjector : public device::Display {
   int index_;
 };
 
-// A camera that was nudged is found by the session's own devices, whose threads go on with the mended rig.
-TEST(LiveDevices, IsRepairedWhileItRuns) {
-  const fs::path folder = test::test_folder();
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
-  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
+// A session whose camera was nudged, and what is left of it after a repair while it ran.
+struct Repair {
+  fs::path folder;
+  Rig before, after;
+  Pose camera_from_world, world_from_prototype;  // true
+  double repair_s = 0, longest_edit_s = 0;
+  std::set<std::string> told;  // progress, as guests were told
+  std::string progress_at_end;
+  apps::ComposedFrame composed;
+};
+
+// The nudged camera is found by the session's own devices, whose threads go on with the mended rig.
+void play_a_repair(Repair* repair) {
+  const fs::path folder = repair->folder = test::test_folder();
+  sim::World world = test::studio_world(0.5);
   apps::SessionSetup setup;
   setup.rig = world.rig;
   setup.rig.provenance_json = R"({"display_latency_ms": {"projector0": 0, "projector1": 0}})";
@@ -316,8 +322,7 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   const auto server = Server::open({.at = "0", .page = folder / "page", .keys = {}}, {}).value();
   ASSERT_TRUE(session->edit({"repair", "", ""}, "test", {}));
   std::atomic<bool> is_ended = false;
-  double longest_s = 0, repair_s = 0;
-  std::set<std::string> progress;
+  double& longest_s = repair->longest_edit_s;
   std::thread guest([&] {
     const auto ask = [&](const std::string& path, const nlohmann::json& body, const std::string& token) {
       return nlohmann::json::parse(test::RemoteClient(server->port()).post(path, body.dump(), token).body);
@@ -329,10 +334,10 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
       (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
       longest_s = std::max(longest_s, seconds_between(requested_at, std::chrono::steady_clock::now()));
       const std::string state = test::RemoteClient(server->port()).get("/api/state", token).body;
-      progress.insert(nlohmann::json::parse(state)["repair"]);
+      repair->told.insert(nlohmann::json::parse(state)["repair"]);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
-    repair_s = seconds_between(begun, std::chrono::steady_clock::now());
+    repair->repair_s = seconds_between(begun, std::chrono::steady_clock::now());
     std::this_thread::sleep_for(std::chrono::milliseconds(1500));
     is_ended = true;
   });
@@ -341,50 +346,78 @@ TEST(LiveDevices, IsRepairedWhileItRuns) {
   guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
   ASSERT_TRUE(output->close(&*session, false).ok());
+  repair->before = setup.rig;
+  repair->after = session->setup().rig;
+  repair->camera_from_world = truth;
+  repair->world_from_prototype = world_from_prototype;
+  repair->progress_at_end = session->recalibration_progress();
+  repair->composed = session->composed();
+}
+
+class RunningRepair : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { play_a_repair(&repair_.emplace()); }
+  static void TearDownTestSuite() { repair_.reset(); }
+  static inline std::optional<Repair> repair_;
+};
+
+TEST_F(RunningRepair, GuestsAreAnsweredMeanwhileAndToldHowFarItIs) {
+  const double longest_s = repair_->longest_edit_s, repair_s = repair_->repair_s;
+  const std::set<std::string>& told = repair_->told;
   std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
   EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
   EXPECT_TRUE(progress.contains("computing"));
   EXPECT_GT(std::count_if(progress.begin(), progress.end(),
                           [](const std::string& words) { return words.ends_with(" patterns"); }),
             3);
-  EXPECT_EQ(session->recalibration_progress(), "");
+  EXPECT_EQ(repair_->progress_at_end, "");
+}
+
+TEST_F(RunningRepair, TheSessionGoesOnWithTheMendedRig) {
+  EXPECT_TRUE(test::pose_near(repair_->after.cameras[0].imager_from_world, repair_->camera_from_world,
+                              0.02 * M_PI / 180, 0.0015));
+  const apps::ComposedFrame& painted = repair_->composed;
+  ASSERT_TRUE(painted.posed.world_from_prototype);
   EXPECT_TRUE(
-      test::pose_near(session->setup().rig.cameras[0].imager_from_world, truth, 0.02 * M_PI / 180, 0.0015));
-  ASSERT_TRUE(session->composed().posed.world_from_prototype);
-  EXPECT_TRUE(test::pose_near(*session->composed().posed.world_from_prototype, world_from_prototype, 0.2_deg,
-                              1.5_mm));
-  EXPECT_GT(cv::countNonZero(session->composed().projectors[1].reshape(1)), 1000);
+      test::pose_near(*painted.posed.world_from_prototype, repair_->world_from_prototype, 0.2_deg, 1.5_mm));
+  EXPECT_GT(cv::countNonZero(painted.projectors[1].reshape(1)), 1000);
+}
+
+TEST_F(RunningRepair, ItsRecordingReplays) {
   apps::ReplayOptions replay;
-  replay.session = folder / "recording";
+  replay.session = repair_->folder / "recording";
   const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
+}
 
-  // Whatever it is at, it ends in time: with the images that were taken.
+// With the images that were taken.
+TEST_F(RunningRepair, WhateverItIsAtItEndsInTime) {
   for (const bool is_computing : {false, true}) {
     std::vector<fs::path> shown;
     auto repair = std::make_unique<apps::LiveRecalibration>(
-        setup.rig, folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
-          apps::WizardBackend around;
-          around.stage.show = [&](int projector, const cv::Mat&) -> Status {
+        repair_->before, repair_->folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
+          apps::WizardBackend backend;
+          backend.capture.show = [&](int projector, const cv::Mat&) -> Status {
             const fs::path images =
-                folder / fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);
+                repair_->folder /
+                fmt::format("out/repaired-1/captures/pose00/projector{}/camera0", projector);
             const auto before = std::count_if(shown.begin(), shown.end(), [&](const fs::path& path) {
               return path.parent_path() == images;
             });
             shown.push_back(images / fmt::format("{:03}.png", before));
             return {};
           };
-          around.stage.grab = [&](int) { return read_image(shown.back()); };
-          around.stage.store = [writer](const fs::path& path, const cv::Mat& image) {
+          backend.capture.grab = [&](int) { return read_image(shown.back()); };
+          backend.capture.store = [writer](const fs::path& path, const cv::Mat& image) {
             return writer->store(path, image);
           };
-          around.written = [writer] { return writer->finish(); };
-          around.use_latency = [](int, double) {};
-          return around;
+          backend.wait_for_files = [writer] { return writer->finish(); };
+          backend.use_latency = [](int, double) {};
+          return backend;
         });
     while (is_computing ? repair->is_capturing() : shown.size() < 10)
       repair->serve(std::chrono::milliseconds(10));
-    EXPECT_FALSE(repair->take());
+    EXPECT_FALSE(repair->take_result());
     const auto begun = std::chrono::steady_clock::now();
     repair.reset();
     const double took_s = seconds_between(begun, std::chrono::steady_clock::now());

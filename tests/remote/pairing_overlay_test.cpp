@@ -15,7 +15,7 @@
 #include "sim/virtual_rig.h"
 #include "tests/remote/virtual_tablet.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/worlds.h"
 
 namespace limn::remote {
 namespace {
@@ -51,8 +51,7 @@ double misread(const cv::Mat& seen, const cv::Mat& sign, const std::array<cv::Po
 // On the door, which is curved and has markers all over.
 TEST(CodeSign, IsReadOnThePrototype) {
   const fs::path folder = test::test_folder();
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+  sim::World world = test::studio_world();
   const device::GlContext context = device::GlContext::create().value();
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
   const apps::SessionSetup setup{world.rig, *world.scene, {}, {}};

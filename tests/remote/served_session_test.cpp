@@ -12,7 +12,6 @@
 
 #include "apps/live.h"
 #include "apps/replay.h"
-#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "remote/pairing_overlay.h"
@@ -21,6 +20,8 @@
 #include "sim/virtual_rig.h"
 #include "tests/remote/a_server.h"
 #include "tests/remote/virtual_tablet.h"
+#include "tests/support/soak.h"
+#include "tests/support/worlds.h"
 #include "tracker/marker_image.h"
 
 namespace limn::remote {
@@ -32,15 +33,13 @@ class AServedSession : public AServer {
  protected:
   void SetUp() override {
     AServer::SetUp();
-    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image);
-    ASSERT_TRUE(world) << world.message();
-    ASSERT_TRUE(scale_resolution(0.25, &world->rig).ok());
+    const sim::World world = test::studio_world(0.25);
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
     apps::SessionSetup setup;
-    setup.rig = world->rig;
-    setup.scene = *world->scene;
+    setup.rig = world.rig;
+    setup.scene = *world.scene;
     setup.scene.folder = folder_ / "project";
     setup.screens = {"wall", "desk"};
     fs::create_directories(setup.scene.folder);
@@ -397,13 +396,6 @@ TEST_F(AServedSession, CostsTheSessionLittle) {
   EXPECT_LT(served_us, 1000);
 }
 
-double resident_mib() {
-  std::ifstream file("/proc/self/statm");
-  double all = 0, resident = 0;
-  file >> all >> resident;
-  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
-
 double thread_ms() {
   timespec time{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
@@ -514,9 +506,7 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
   ::getrlimit(RLIMIT_NOFILE, &files);
   files.rlim_cur = std::min<rlim_t>(files.rlim_max, 8192);
   ::setrlimit(RLIMIT_NOFILE, &files);
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
-  ASSERT_TRUE(scale_resolution(0.25, &world.rig).ok());
+  sim::World world = test::studio_world(0.25);
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   const apps::SessionSetup& setup = session_->setup();
   apps::Perception perception = apps::Perception::create(setup.scene, setup.rig, setup.watch).value();
@@ -549,13 +539,13 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
         EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(lit_by(i)));
       out.all_ms.push_back(1e3 * seconds_since(frame));
       out.guests_ms.push_back(guests_ms);
-      out.most_mib = std::max(out.most_mib, resident_mib());
+      out.most_mib = std::max(out.most_mib, test::resident_mib());
     }
     return out;
   };
   played(0.1);  // warms up
   const Frames alone = played(0.5);
-  const double before_mib = resident_mib();
+  const double before_mib = test::resident_mib();
   attack.begin();
   const Frames attacked = played(k_attack_s);
   fmt::print(
@@ -607,11 +597,8 @@ class StderrFile {
 
 // Guests' edits come at any moment, are in the recording, and come again at the same one.
 TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
-  const fs::path folder = test::test_folder(), config = fs::path(LIMN_SOURCE_DIR) / "config";
-  fs::copy(config / "scenes/door", folder / "door");
-  std::string world = read_file(config / "worlds/studio.json").value();
-  world.replace(world.find("../scenes/door"), 14, "door");
-  ASSERT_TRUE(write_file(folder / "world.json", world));
+  const fs::path folder = test::test_folder();
+  test::copy_studio_to(folder);
   ::setenv("XDG_CONFIG_HOME", folder.c_str(), 1);
   apps::LiveOptions options;
   options.resolution = 0.25;

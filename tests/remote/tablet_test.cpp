@@ -11,7 +11,6 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
-#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "remote/tablet/intrinsics_store.h"
@@ -24,8 +23,8 @@
 #include "sim/virtual_rig.h"
 #include "tests/remote/virtual_tablet.h"
 #include "tests/support/matchers.h"
+#include "tests/support/worlds.h"
 #include "tracker/family.h"
-#include "tracker/marker_image.h"
 
 namespace limn::remote {
 namespace {
@@ -36,20 +35,12 @@ using nlohmann::json;
 constexpr int k_width = 640, k_height = 400;
 constexpr const char* k_tablet = "tablet-of-ann";
 
-Pose pose_of(const json& node) {
-  const auto& q = node["rotation_wxyz"];
-  const auto& t = node["translation_m"];
-  return {Eigen::Quaterniond(q[0], q[1], q[2], q[3]), Eigen::Vector3d(t[0], t[1], t[2])};
-}
-
 // A session in the studio that has seen and lit the door, and somebody who looks on.
 class Room {
  public:
   explicit Room(const fs::path& lens_folder, double resolution = 0.5, double frame_period_s = 1 / 30.0)
       : context_(device::GlContext::create().value()) {
-    sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
-    EXPECT_TRUE(scale_resolution(resolution, &world.rig).ok());
+    sim::World world = test::studio_world(resolution);
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_.emplace(std::move(world),
@@ -124,7 +115,7 @@ std::vector<Eigen::Vector3d> part_points(const sim::World& world, const scene::P
 Imager view_of(const json& reply, const Imager& truth) {
   Imager view = truth;
   view.lens = Lens::create(reply["lens"]["model"], reply["lens"]["values"]).value();
-  view.imager_from_world = pose_of(reply["view_from_world"]);
+  view.imager_from_world = test::pose_of(reply["view_from_world"]);
   return view;
 }
 
@@ -472,7 +463,8 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
     }
     ++drawn;
     const Imager& truth = (i % 2 == 0 ? one : other).camera;
-    EXPECT_TRUE(test::pose_near(pose_of(reply[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
+    EXPECT_TRUE(
+        test::pose_near(test::pose_of(reply[0]["view_from_world"]), truth.imager_from_world, 0.05, 0.1));
   }
   EXPECT_LT(drawn, 2 * k_images);
   // What still waits at the end is told so.
@@ -488,8 +480,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
 }
 
 TEST(Tablet, AMarkerThatIsBeingMovedIsPlacedByTheGuestsOwnImage) {
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+  sim::World world = test::studio_world();
   const scene::Scene scene = *world.scene;
   const std::vector<Body> bodies = scene::bodies(scene);
   // What the session takes to be true.

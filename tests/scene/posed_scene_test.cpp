@@ -5,12 +5,14 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "tests/support/matchers.h"
+#include "tests/support/tracks.h"
 
 namespace limn::scene {
 namespace {
 
 using Eigen::Vector3d;
 using namespace test::literals;
+using test::track_of;
 
 // Half of a cylinder of radius 0.5 along y, whose outside faces -z.
 Mesh half_cylinder() {
@@ -43,13 +45,6 @@ Scene two_slots(bool stick) {
     scene.slots.push_back(slot);
   }
   return scene;
-}
-
-Track track_of(const std::string& body, const Pose& world_from_body) {
-  Track track;
-  track.body = body;
-  track.world_from_body = world_from_body;
-  return track;
 }
 
 TEST(Posed, PartsRideOnTheirMarkersAndUnseenOnesAreAbsent) {

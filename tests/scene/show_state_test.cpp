@@ -5,11 +5,13 @@
 #include "core/file.h"
 #include "scene/actions.h"
 #include "tests/support/matchers.h"
+#include "tests/support/tracks.h"
 
 namespace limn::scene {
 namespace {
 
 using namespace test::literals;
+using test::track_of;
 
 Scene two_slots() {
   Scene scene;
@@ -24,13 +26,6 @@ Scene two_slots() {
     scene.slots.push_back(slot);
   }
   return scene;
-}
-
-Track track_of(const std::string& body, const Pose& world_from_body) {
-  Track track;
-  track.body = body;
-  track.world_from_body = world_from_body;
-  return track;
 }
 
 const Pose k_world_from_prototype(exp_rotation({0.3, -0.2, 0.9}), {1, 2, 3});

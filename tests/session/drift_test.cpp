@@ -11,7 +11,6 @@
 #include <random>
 
 #include "core/file.h"
-#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "session/frame_composer.h"
 #include "session/perception.h"
@@ -19,7 +18,8 @@
 #include "session/script.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/soak.h"
+#include "tests/support/worlds.h"
 
 namespace limn::apps {
 namespace {
@@ -38,10 +38,8 @@ struct RendererInput {
 std::vector<RendererInput> found(const json& events, double seconds) {
   const fs::path file = test::test_folder() / "script.json";
   const json script = {{"schema", "limn.script/1"}, {"seconds", seconds}, {"events", events}};
-  EXPECT_TRUE(write_file(file, script.dump()));
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
-  EXPECT_TRUE(scale_resolution(0.34, &world.rig).ok());
+  test::write_json(file, script);
+  sim::World world = test::studio_world(0.34);
   const SessionSetup setup{world.rig, *world.scene, {}, {}};
   sim::VirtualRig rig(std::move(world), {.frame_period_s = 0.1, .grab_waits_for_light = false});
   ScriptedRoom room = ScriptedRoom::create(load_script(file).value(), &rig).value();
@@ -117,11 +115,6 @@ TEST(Drift, ACameraIsNamed) {
   expect_named(found_after_hands(nudge("camera0", {0.1, 0.15, 0}), 9), "camera0");
 }
 
-double soak_s() {
-  const char* wanted = std::getenv("LIMN_SOAK_S");
-  return wanted ? std::max(12.0, std::strtod(wanted, nullptr)) : 12;
-}
-
 // Hands come into the light and onto markers and move parts, some at the same time and never long apart. The
 // nudge after all of it must be found: this shows that the watch was active all the time.
 TEST(Drift, HandsAreNone) {
@@ -129,7 +122,7 @@ TEST(Drift, HandsAreNone) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(rng);
   };
-  const double seconds = soak_s();
+  const double seconds = test::soak_s(12, 12);
   json events;
   for (const std::string projector : {"projector0", "projector1"})
     for (double at_s = uniform(0.5, 4), until_s = 0; at_s < seconds; at_s = until_s + uniform(1, 8))

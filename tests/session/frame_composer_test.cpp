@@ -6,25 +6,21 @@
 #include <filesystem>
 #include <span>
 
-#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "session/perception.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/worlds.h"
 
 namespace limn::apps {
 namespace {
 
 using namespace test::literals;
-namespace fs = std::filesystem;
 
 // Its markers are measured slightly differently in every image, and it must not move with that noise. A real
 // move of less than half a millimetre must be shown.
 TEST(FrameComposer, APrototypeThatStandsStillIsShownWhereItWas) {
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
-  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
+  sim::World world = test::studio_world(0.5);
   const auto object = std::find_if(world.objects.begin(), world.objects.end(),
                                    [](const sim::Object& o) { return o.name == "prototype"; });
   ASSERT_NE(object, world.objects.end());

@@ -79,7 +79,7 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
 class AFrameLoop : public testing::Test {
  protected:
   AFrameLoop() : context_(device::GlContext::create().value()) {
-    const sim::World world = studio(0.25);
+    const sim::World world = studio_world(0.25);
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_.emplace(world, sim::VirtualRigOptions{.grab_waits_for_light = false});

@@ -12,6 +12,7 @@
 
 #include "session/perception.h"
 #include "tests/support/matchers.h"
+#include "tests/support/soak.h"
 #include "tests/tracker/marker_images.h"
 
 namespace limn::apps {
@@ -24,11 +25,6 @@ constexpr int k_side = 320;  // side of the image; a pixel is a millimetre of th
 constexpr double k_table_s = 100;
 constexpr double k_arrives_mm_s = 1000;
 constexpr std::size_t k_cover = 0, k_turn = 1, k_lay = 2;  // indices of the controls
-
-double soak_s() {
-  const char* wanted = std::getenv("LIMN_SOAK_S");
-  return wanted ? std::max(10.0, std::strtod(wanted, nullptr)) : 60;
-}
 
 Eigen::Vector2d direction(double angle) { return {std::cos(angle), std::sin(angle)}; }
 
@@ -187,7 +183,7 @@ TEST(Hands, GesturesActOnceAndSoon) {
     if (is_right && control == k_cover)
       late_s.push_back(hand.first_use_s() - tracker::GestureOptions{}.cover_s);
   };
-  while (seconds < soak_s()) {
+  while (seconds < test::soak_s(10, 60)) {
     Table table(rng);
     while (table.now_s() < k_table_s) {
       Hand covers(&table, k_cover);
@@ -235,7 +231,7 @@ TEST(Hands, ThatPassDoNotAct) {
   auto rng = test::test_rng();
   int passed = 0, acts = 0;
   double seconds = 0;
-  while (seconds < soak_s()) {
+  while (seconds < test::soak_s(10, 60)) {
     Table table(rng);
     for (; table.now_s() < k_table_s; ++passed) {
       const double course = table.uniform(0, 6.28), mm_s = table.uniform(150, 900);

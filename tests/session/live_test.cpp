@@ -47,7 +47,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const fs::path folder = test::test_folder();
   LiveOptions options;
   options.resolution = 0.5;
-  options.script = written(
+  options.script = write_json(
       folder / "script.json",
       script_of(0.7,
                 {{{"at_s", 0.2},
@@ -114,7 +114,7 @@ TEST(Live, GoesOnWithAMendedRig) {
   const auto edit = [](double at_s, const std::string& action, const std::string& value) {
     return json{{"at_s", at_s}, {"edit", {{"action", action}, {"value", value}}}};
   };
-  options.script = written(
+  options.script = write_json(
       folder / "script.json",
       script_of(k_mended_s, {{{"at_s", 0.05}, {"nudge", "projector1"}, {"degrees", {0, 0.25, 0}}},
                              edit(0.3, "blackout", "on"),
@@ -126,7 +126,7 @@ TEST(Live, GoesOnWithAMendedRig) {
   options.out = folder / "out";
   const Status lived = run_live(options);
   ASSERT_TRUE(lived.ok()) << lived.message();
-  const Imager before = studio(0.5).rig.projectors[1];
+  const Imager before = studio_world(0.5).rig.projectors[1];
   const Pose nudge(exp_rotation(Eigen::Vector3d(0, 0.25, 0) * M_PI / 180), Eigen::Vector3d::Zero());
   const Pose truth = nudge.inverse() * before.imager_from_world;
   const auto mended = load_rig(folder / "out/repaired-1");
@@ -212,7 +212,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
 
 // The driver takes the GL context away: the shown images stay, and they are drawn again in a new context.
 TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
-  const sim::World world = studio(0.34);
+  const sim::World world = studio_world(0.34);
   SessionSetup setup{world.rig, *world.scene, {}, {}};
   setup.paint.refill = false;
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
@@ -280,7 +280,7 @@ class Canvas : public device::Display {
 // Three screens, as in a devices file; the recording has their names.
 TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   const fs::path folder = test::test_folder();
-  const sim::World world = studio(0.34);
+  const sim::World world = studio_world(0.34);
   SessionSetup setup{world.rig, *world.scene, {}, {}, {"wall", "desk", "roof"}};
   sim::VirtualRig room(world, {.grab_waits_for_light = false});
   const cv::Mat seen = room.camera(0).next()->image;
@@ -327,8 +327,8 @@ TEST(Live, GoesOnWithoutItsCamera) {
   const fs::path folder = test::test_folder();
   LiveOptions options;
   options.resolution = 0.5;
-  options.script = written(folder / "script.json",
-                           script_of(1.6, {{{"at_s", 0.3}, {"until_s", 1.3}, {"unplug", "camera0"}}}));
+  options.script = write_json(folder / "script.json",
+                              script_of(1.6, {{{"at_s", 0.3}, {"until_s", 1.3}, {"unplug", "camera0"}}}));
   options.out = folder / "out";
   options.record = folder / "recording";
   const Status lived = run_live(options);
@@ -353,7 +353,7 @@ TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
   const auto lived = [&](const std::string& name, double duration_s, const json& events) {
     LiveOptions options;
     options.resolution = 0.5;
-    options.script = written(folder / (name + ".json"), script_of(duration_s, events));
+    options.script = write_json(folder / (name + ".json"), script_of(duration_s, events));
     options.out = folder / name;
     const Status status = run_live(options);
     EXPECT_TRUE(status.ok()) << status.message();
@@ -394,7 +394,7 @@ TEST(Live, RefillsASomebodysShadow) {
     LiveOptions options;
     options.resolution = 0.5;
     options.refill = refill;
-    options.script = written(folder / (name + ".json"), script_of(0.6, events));
+    options.script = write_json(folder / (name + ".json"), script_of(0.6, events));
     options.out = folder / name;
     EXPECT_TRUE(run_live(options).ok());
     return read_image(options.out / "projector-projector1.png").value();
@@ -418,18 +418,18 @@ TEST(Live, KeepsLooks) {
   const auto edit = [](double at_s, const std::string& action, const std::string& value) {
     return json{{"at_s", at_s}, {"edit", {{"action", action}, {"value", value}}}};
   };
-  options.script =
-      written(folder / "script.json",
-              script_of(0.35, {edit(0.1, "save_look", "calm"),
-                               {{"at_s", 0.13}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
-                               {{"at_s", 0.13},
-                                {"edit", {{"action", "material"}, {"slot", "mirror"}, {"value", "#20c040"}}}},
-                               edit(0.16, "light", "-60 20 0.9 0.2 0.05"),
-                               edit(0.2, "save_look", "bold"),
-                               edit(0.24, "save_look", "third"),
-                               edit(0.27, "delete_look", "third"),
-                               edit(0.29, "delete_look", "calm"),
-                               edit(0.31, "undelete_look", "")}));
+  options.script = write_json(
+      folder / "script.json",
+      script_of(0.35, {edit(0.1, "save_look", "calm"),
+                       {{"at_s", 0.13}, {"edit", {{"action", "next_variant"}, {"slot", "mirror"}}}},
+                       {{"at_s", 0.13},
+                        {"edit", {{"action", "material"}, {"slot", "mirror"}, {"value", "#20c040"}}}},
+                       edit(0.16, "light", "-60 20 0.9 0.2 0.05"),
+                       edit(0.2, "save_look", "bold"),
+                       edit(0.24, "save_look", "third"),
+                       edit(0.27, "delete_look", "third"),
+                       edit(0.29, "delete_look", "calm"),
+                       edit(0.31, "undelete_look", "")}));
   ASSERT_TRUE(run_live(options).ok());
   const fs::path looks = folder / "door/looks";
   const json calm = read_json(looks / "calm.json"), bold = read_json(looks / "bold.json");
@@ -454,7 +454,7 @@ TEST(Live, KeepsLooks) {
 
   // The next session loads the saved looks.
   options.script =
-      written(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
+      write_json(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
   options.out = folder / "out";
   ASSERT_TRUE(run_live(options).ok());
   const auto poses = lines_of(folder / "out/poses.csv");
@@ -538,7 +538,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
 
 // There is a second camera beside the first, and their cables are exchanged.
 TEST(Live, KnowsCamerasThatWereExchanged) {
-  sim::World world = studio(0.5);
+  sim::World world = studio_world(0.5);
   Imager second = world.rig.cameras[0];
   second.name = "camera1";
   second.imager_from_world = looking_at({0.6, -1.5, 0.6}, {0, 0, 0.42}, Eigen::Vector3d::UnitZ());
@@ -584,7 +584,7 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   constexpr const char* k_cap = "aruco_4x4_50:9";
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  sim::World world = studio(0.25);
+  sim::World world = studio_world(0.25);
   scene::Viewer cap, tablets;
   cap.marker = MarkerName::parse(k_cap).value();
   cap.marker_size_m = 0.12;
@@ -598,8 +598,8 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   const Pose world_from_cap = looking_at(p_cap, 2 * p_cap - p_camera, Eigen::Vector3d::UnitZ()).inverse();
   ASSERT_TRUE(sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_image));
   const fs::path folder = test::test_folder();
-  const auto script = load_script(
-      written(folder / "script.json", script_of(6, {{{"at_s", 2.4}, {"until_s", 4.8}, {"cover", k_cap}}})));
+  const auto script = load_script(write_json(
+      folder / "script.json", script_of(6, {{{"at_s", 2.4}, {"until_s", 4.8}, {"cover", k_cap}}})));
   ASSERT_TRUE(script) << script.message();
   const SessionSetup setup{world.rig, *world.scene, {}, {}};
   const Eigen::Vector3d p_fixed = world.scene->viewers[0].fixed->imager_from_world.inverse().translation,
@@ -658,8 +658,8 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
 }
 
 TEST(Live, MakesARoomForARigAndAScene) {
-  const sim::World studio_world = studio(0.5);
-  const auto room = room_for(studio_world.rig, *studio_world.scene);
+  const sim::World world = studio_world(0.5);
+  const auto room = room_for(world.rig, *world.scene);
   ASSERT_TRUE(room) << room.message();
   sim::VirtualRig rig(*room, {.grab_waits_for_light = false});
   auto perception = Perception::create(*room->scene, room->rig);
@@ -679,17 +679,17 @@ TEST(Live, SaysWhatIsWrong) {
   one.rig = folder;
   EXPECT_NE(message(one).find("--rig and --scene together"), std::string::npos);
   LiveOptions script;
-  script.script = written(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
+  script.script = write_json(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
   EXPECT_NE(
       message(script).find(
           "events[0]: expected one of sway, move, cover, block, unplug, nudge, resize, clock_step, edit"),
       std::string::npos)
       << message(script);
   script.script =
-      written(folder / "b.json", script_of(1, {{{"at_s", 2}, {"until_s", 1}, {"cover", k_mirror}}}));
+      write_json(folder / "b.json", script_of(1, {{{"at_s", 2}, {"until_s", 1}, {"cover", k_mirror}}}));
   EXPECT_NE(message(script).find("until_s"), std::string::npos);
-  script.script =
-      written(folder / "c.json", script_of(1, {{{"at_s", 0}, {"until_s", 1}, {"cover", "aruco_4x4_50:44"}}}));
+  script.script = write_json(folder / "c.json",
+                             script_of(1, {{{"at_s", 0}, {"until_s", 1}, {"cover", "aruco_4x4_50:44"}}}));
   EXPECT_NE(message(script).find("a marker that stands in the room"), std::string::npos);
   const std::vector<std::pair<json, std::string>> refused = {
       {{{"at_s", 0}, {"until_s", 1}, {"unplug", "camera7"}}, "a device that stands in the room (camera0, "},
@@ -703,11 +703,11 @@ TEST(Live, SaysWhatIsWrong) {
        "a camera that stands in the room (camera0), found 'projector0'"},
       {{{"at_s", 0}, {"clock_step", "camera0"}, {"seconds", 1e300}}, "expected at most"}};
   for (const auto& [event, why] : refused) {
-    script.script = written(folder / "d.json", script_of(1, json::array({event})));
+    script.script = write_json(folder / "d.json", script_of(1, json::array({event})));
     EXPECT_NE(message(script).find(why), std::string::npos) << event << message(script);
   }
   LiveOptions other_rig;  // it has another projector size
-  sim::World world = studio(1);
+  sim::World world = studio_world();
   world.rig.projectors[1].width = 1024;
   ASSERT_TRUE(save_rig(world.rig, folder / "rig"));
   other_rig.rig = folder / "rig";

@@ -14,17 +14,16 @@
 #include "sim/virtual_rig.h"
 #include "tests/gui/gui_canvas.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
 // X defines macros; include it last.
 #include "tests/gui/x_person.h"
+#include "tests/support/display.h"
+#include "tests/support/worlds.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
-
-bool has_display() { return std::getenv("DISPLAY") != nullptr; }
 
 const cv::Scalar k_orange(30, 120, 230), k_violet(200, 60, 140), k_teal(140, 160, 40);
 
@@ -337,7 +336,7 @@ void press_keys(test::XPerson* x) {
 }
 
 TEST(OperatorWindow, KeysAndClicksReachAVirtualSession) {
-  if (!has_display()) GTEST_SKIP() << "no display: OperatorWindow.KeysAndClicksReachAVirtualSession";
+  if (!test::has_x_server()) GTEST_SKIP() << "no display: OperatorWindow.KeysAndClicksReachAVirtualSession";
   LiveOptions options;
   options.resolution = 0.25;
   options.seconds = 100000;
@@ -355,10 +354,9 @@ TEST(OperatorWindow, KeysAndClicksReachAVirtualSession) {
 }
 
 TEST(OperatorWindow, KeysReachASessionOnDevices) {
-  if (!has_display()) GTEST_SKIP() << "no display: OperatorWindow.KeysReachASessionOnDevices";
+  if (!test::has_x_server()) GTEST_SKIP() << "no display: OperatorWindow.KeysReachASessionOnDevices";
   const fs::path folder = test::test_folder();
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
+  sim::World world = test::studio_world();
   const Rig rig = world.rig;
   const fs::path scene = world.scene->folder;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());

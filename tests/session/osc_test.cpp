@@ -12,12 +12,11 @@
 #include <thread>
 
 #include "core/file.h"
-#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "session/osc_port.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
-#include "tracker/marker_image.h"
+#include "tests/support/worlds.h"
 
 namespace limn::apps {
 namespace {
@@ -195,15 +194,13 @@ TEST(Osc, SurvivesSpoiltBytes) {
 class AnOscSession : public testing::Test {
  protected:
   void SetUp() override {
-    auto world = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image);
-    ASSERT_TRUE(world) << world.message();
-    ASSERT_TRUE(scale_resolution(0.25, &world->rig).ok());
+    const sim::World world = test::studio_world(0.25);
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
     SessionSetup setup;
-    setup.rig = world->rig;
-    setup.scene = *world->scene;
+    setup.rig = world.rig;
+    setup.scene = *world.scene;
     setup.screens = {"wall", "desk"};
     auto telemetry = Telemetry::create({});
     ASSERT_TRUE(telemetry);
@@ -354,9 +351,7 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   heard();
 
   // After a frame in which everything is seen, the poses are sent.
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image).value();
-  ASSERT_TRUE(scale_resolution(0.5, &world.rig).ok());
+  sim::World world = test::studio_world(0.5);
   Rig rig = world.rig;
   sim::VirtualRig virtual_rig(std::move(world), {.grab_waits_for_light = false});
   auto perception = Perception::create(session_->setup().scene, rig);

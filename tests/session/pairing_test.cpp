@@ -17,6 +17,7 @@
 #include "sim/ray_scene.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
+#include "tests/support/worlds.h"
 #include "tests/tracker/marker_images.h"
 #include "tracker/marker_image.h"
 
@@ -29,22 +30,17 @@ using nlohmann::json;
 const MarkerName k_nine{"aruco_4x4_50", "9"};
 const Eigen::Vector3d k_laid(0.12, -0.03, 0.052);  // in the door's frame
 
-json read_json(const fs::path& path) { return json::parse(read_file(path).value(), nullptr, true, true); }
-
 // Copies the studio into a folder (world.json and door/) and adds a marker on the door that carries nothing.
 fs::path studio_in(const fs::path& folder) {
-  const fs::path config = fs::path(LIMN_SOURCE_DIR) / "config";
-  fs::copy(config / "scenes/door", folder / "door");
-  json world = read_json(config / "worlds/studio.json");
-  world["scene"] = "door";
+  test::copy_studio_to(folder);
+  json world = test::read_json(folder / "world.json");
   json place = world["slot_markers"]["trim"];
   for (std::size_t i = 0; i < 3; ++i)
     place["prototype_from_marker"]["translation_m"][i] = k_laid[static_cast<Eigen::Index>(i)];
   place["name"] = k_nine.text();
   place["size_mm"] = 40;
   world["loose_markers"] = json::array({place});
-  EXPECT_TRUE(write_file(folder / "world.json", world.dump(2)));
-  return folder / "world.json";
+  return test::write_json(folder / "world.json", world);
 }
 
 // The last position of a part in poses.csv, mm in the prototype's frame.
@@ -115,7 +111,7 @@ TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
   ASSERT_TRUE(scene);
   const double offset_mm = 1e3 * scene->find_slot("mirror")->marker_from_part.translation.norm();
   EXPECT_NEAR((last_place(folder / "out/poses.csv", "mirror") - 1e3 * k_laid).norm(), offset_mm, 3);
-  EXPECT_EQ(read_json(folder / "door/pairings.json")["slots"]["mirror"], k_nine.text());
+  EXPECT_EQ(test::read_json(folder / "door/pairings.json")["slots"]["mirror"], k_nine.text());
 
   ReplayOptions replay;
   replay.session = folder / "recording";

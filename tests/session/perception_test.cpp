@@ -26,14 +26,14 @@ TEST(Perception, PredictionMakesUpForTheLag) {
   constexpr double k_amplitude_m = 0.25 / (2 * M_PI * 0.5);
   const fs::path folder = test::test_folder();
   const auto script = load_script(
-      written(folder / "script.json", script_of(k_runs_s, {{{"at_s", k_begins_s},
-                                                            {"until_s", k_ends_s},
-                                                            {"sway", k_mirror},
-                                                            {"amplitude_m", {k_amplitude_m, 0, 0}},
-                                                            {"hz", 0.5}}})));
+      write_json(folder / "script.json", script_of(k_runs_s, {{{"at_s", k_begins_s},
+                                                               {"until_s", k_ends_s},
+                                                               {"sway", k_mirror},
+                                                               {"amplitude_m", {k_amplitude_m, 0, 0}},
+                                                               {"hz", 0.5}}})));
   ASSERT_TRUE(script) << script.message();
   const MarkerName marker = MarkerName::parse(k_mirror).value();
-  sim::World world = studio(1);
+  sim::World world = studio_world();
   const Pose world_from_marker = *sim::world_from_marker(world, marker);
   const Eigen::Vector3d p_eye = world.rig.cameras[0].imager_from_world.inverse().translation;
   const Pose camera_from_world = looking_at(p_eye, world_from_marker.translation, Eigen::Vector3d::UnitZ());
@@ -81,7 +81,7 @@ TEST(Perception, PredictionMakesUpForTheLag) {
 }
 
 TEST(Perception, LooksForCoveredMarkersWhileOneIsMissing) {
-  sim::World world = studio(1);
+  sim::World world = studio_world();
   const MarkerName control = MarkerName::parse("apriltag_36h11:9").value();
   world.scene->controls = {{control, scene::ActionId::next_variant, "mirror", Gesture::cover}};
   const Pose lying(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45});
@@ -116,7 +116,7 @@ TEST(Perception, LooksForCoveredMarkersWhileOneIsMissing) {
 
 // A camera is turned quickly: markers are followed at their predicted positions, not searched for.
 TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
-  sim::World world = studio(1);
+  sim::World world = studio_world();
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
   const int camera = 0;
   const Frame still = rig.expose(std::span(&camera, 1))[0];
@@ -142,7 +142,7 @@ TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
 }
 
 TEST(Perception, ReadsWhatControlMarkersSay) {
-  sim::World world = studio(0.5);
+  sim::World world = studio_world(0.5);
   world.scene->controls = {
       {MarkerName::parse("aruco_4x4_50:9").value(), scene::ActionId::next_variant, "mirror", Gesture::cover}};
   ASSERT_TRUE(
@@ -152,8 +152,8 @@ TEST(Perception, ReadsWhatControlMarkersSay) {
                       false, marker_image));
   const fs::path folder = test::test_folder();
   const auto script =
-      load_script(written(folder / "script.json",
-                          script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
+      load_script(write_json(folder / "script.json",
+                             script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
   ASSERT_TRUE(script) << script.message();
   const scene::Scene scene = *world.scene;
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});

@@ -11,9 +11,14 @@
 namespace limn::test {
 namespace {
 
+// "Suite.Name"; in SetUpTestSuite(), "Suite".
 std::string running_test() {
-  const auto* info = testing::UnitTest::GetInstance()->current_test_info();
-  std::string name = info ? std::string(info->test_suite_name()) + "." + info->name() : "setup";
+  const testing::UnitTest& program = *testing::UnitTest::GetInstance();
+  const auto* info = program.current_test_info();
+  const auto* suite = program.current_test_suite();
+  std::string name = info    ? std::string(info->test_suite_name()) + "." + info->name()
+                     : suite ? suite->name()
+                             : "setup";
   for (char& c : name) {
     if (c == '/') c = '_';
   }

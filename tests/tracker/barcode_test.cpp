@@ -11,22 +11,11 @@
 
 #include "core/image_io.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_images.h"
+#include "tests/tracker/vga_markers.h"
 #include "tracker/detector.h"
 
 namespace limn::tracker {
 namespace {
-
-using namespace test::literals;
-using test::PlacedMarker;
-
-Families families(const std::vector<std::string>& names) { return Families::load(names).value(); }
-
-Lens pinhole_vga() { return Lens::pinhole(600, 600, 319.5, 239.5); }
-
-double uniform(std::mt19937_64& rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(rng);
-}
 
 std::vector<std::uint32_t> words(const std::string& name) {
   const Barcode& barcode = *find_barcode(name);

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "tests/support/matchers.h"
+#include "tests/support/random.h"
 #include "tests/tracker/marker_images.h"
 #include "tests/tracker/seen_body.h"
 #include "tracker/detector.h"
@@ -18,6 +19,7 @@ using namespace test::literals;
 using test::body_of;
 using test::camera_1080p;
 using test::detections_of;
+using test::uniform;
 
 constexpr double k_frame_s = 1 / 30.0;
 
@@ -30,10 +32,6 @@ std::vector<BodyFilter> step(const std::vector<BodyFilter>& known,
                              double seconds) {
   const View view{&camera, detections};
   return observed(known, std::span(&body, 1), std::span(&view, 1), at(seconds));
-}
-
-double uniform(std::mt19937_64& rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(rng);
 }
 
 // A marker whose tilt against its own line of sight varies between 10 and 60 degrees, towards changing sides.

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "tests/support/matchers.h"
+#include "tests/support/random.h"
 #include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
@@ -12,15 +13,12 @@ namespace limn::tracker {
 namespace {
 
 using namespace test::literals;
+using test::uniform;
 
 constexpr double k_frame_s = 1 / 30.0;
 constexpr int k_side = 240;  // width of the image; a pixel is a millimetre of the table
 const Eigen::Vector2d k_px_control(120, 120);
 const MarkerName k_control{"aruco_4x4_50", "7"}, k_other{"aruco_4x4_50", "3"}, k_another{"aruco_4x4_50", "5"};
-
-double uniform(std::mt19937_64& rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(rng);
-}
 
 Eigen::Vector2d direction(double angle) { return {std::cos(angle), std::sin(angle)}; }
 

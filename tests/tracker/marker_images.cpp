@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "tests/support/random.h"
 #include "tracker/family.h"
 
 namespace limn::test {
@@ -176,9 +177,6 @@ class MarkerPainter {
   }
 };
 
-double uniform(std::mt19937_64& rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(rng);
-}
 int whole(std::mt19937_64& rng, int low, int high) {
   return std::uniform_int_distribution<int>(low, high)(rng);
 }

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "tests/support/matchers.h"
+#include "tests/support/random.h"
 #include "tests/tracker/marker_images.h"
 #include "tracker/body_estimate.h"
 #include "tracker/body_pose.h"
@@ -16,16 +17,13 @@ namespace limn::tracker {
 namespace {
 
 using namespace test::literals;
+using test::uniform;
 using Corners = std::array<Eigen::Vector2d, 4>;
 using Covariances = std::array<Eigen::Matrix2d, 4>;
 
 Lens bent_lens() {
   return Lens::create("LENSMODEL_OPENCV8", {600, 610, 322, 236, -0.2, 0.06, 1e-3, -5e-4, 0.01, 0, 0, 0})
       .value();
-}
-
-double uniform(std::mt19937_64& rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(rng);
 }
 
 // A pose of a marker in front of the camera, tilted by `tilt`.

@@ -7,18 +7,13 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "tests/support/matchers.h"
-#include "tests/tracker/marker_images.h"
+#include "tests/tracker/vga_markers.h"
 #include "tracker/detector.h"
 #include "tracker/template_comparison.h"
 #include "tracker/template_training.h"
 
 namespace limn::tracker {
 namespace {
-
-using namespace test::literals;
-using test::PlacedMarker;
-
-Lens pinhole_vga() { return Lens::pinhole(600, 600, 319.5, 239.5); }
 
 std::string detected_text(const std::filesystem::path& file) { return "artoolkit:" + file.string(); }
 

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/support/matchers.h"
+#include "tests/support/random.h"
 #include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
@@ -13,12 +14,9 @@ namespace limn::tracker {
 
 using namespace test::literals;
 using test::PlacedMarker;
+using test::uniform;
 
 inline Families families(const std::vector<std::string>& names) { return Families::load(names).value(); }
-
-inline double uniform(std::mt19937_64& rng, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(rng);
-}
 
 inline Lens pinhole_vga() { return Lens::pinhole(600, 600, 319.5, 239.5); }
 inline Lens bent_vga() {

@@ -12,38 +12,27 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "apps/command_line.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "device/gl_context.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
+#include "tests/support/run_limn.h"
 #include "validate/check_judge.h"
 
 namespace limn::apps {
 namespace {
 
 namespace fs = std::filesystem;
+using test::Outcome;
 
 const fs::path k_config = fs::path(LIMN_SOURCE_DIR) / "config";
 constexpr const char* k_viewer =
     R"({"eye_m": [-0.2, -1.4, 0.7], "target_m": [0, 0, 0.4], "size": [640, 480], "fov_deg": 34})";
 
-struct Outcome {
-  int code = 0;
-  std::string out, err;
-};
-
 Outcome run(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), {"limn", "check"});
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  Outcome outcome;
-  outcome.code = run_command_line(static_cast<int>(argv.size()), argv.data());
-  outcome.err = testing::internal::GetCapturedStderr();
-  outcome.out = testing::internal::GetCapturedStdout();
-  return outcome;
+  arguments.insert(arguments.begin(), "check");
+  return test::run_limn(std::move(arguments));
 }
 
 // A check file in `folder` on a world of config/worlds. `rest`: its members except schema, about and world.
@@ -136,7 +125,7 @@ TEST(Check, SeveralViewersShareAnEye) {
   // The scene's own viewers, one with a cap that is in the world.
   const fs::path folder = test::test_folder();
   fs::copy(k_config / "scenes/door", folder / "door");
-  auto scene = nlohmann::json::parse(read_file(folder / "door/scene.json").value(), nullptr, true, true);
+  auto scene = test::read_json(folder / "door/scene.json");
   const auto fixed = scene.at("viewer");
   scene["viewer"] = {fixed, {{"marker", scene.at("slots")[0].at("marker")}, {"eye_mm", {0, 0, -900}}}};
   scene["slots"][0]["marker"] = "aruco_4x4_50:40";
@@ -310,8 +299,7 @@ TEST(Check, ALimitThatCannotHoldFailsAndIsNamed) {
   EXPECT_NE(outcome.out.find("MISSED"), std::string::npos) << outcome.out;
   EXPECT_NE(outcome.err.find("small"), std::string::npos) << outcome.err;
   EXPECT_NE(read_file(folder / "out" / "check.html").value().find("1 of 1 failed"), std::string::npos);
-  EXPECT_FALSE(
-      nlohmann::json::parse(read_file(folder / "out" / "check.json").value()).at("passed").get<bool>());
+  EXPECT_FALSE(test::read_json(folder / "out" / "check.json").at("passed").get<bool>());
 }
 
 TEST(Check, AnotherRunsImagesAreComparedWith) {

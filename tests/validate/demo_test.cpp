@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
+#include "tests/support/json.h"
 #include "tests/support/matchers.h"
 
 namespace limn::apps {
@@ -17,7 +18,7 @@ TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
   const auto folder = test::test_folder();
   const Status done = run_demo({.out = folder});
   ASSERT_TRUE(done) << done.message();
-  const auto json = nlohmann::json::parse(read_file(folder / "demo.json").value());
+  const auto json = test::read_json(folder / "demo.json");
   EXPECT_LE(json.at("held_out_px"), 0.1);
   for (const char* place : {"in_place", "moved", "turned"}) {
     const auto& registration = json.at("registration_mm").at(place);

@@ -5,6 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "tests/support/matchers.h"
+#include "tests/support/meshes.h"
 
 namespace limn::apps {
 namespace {
@@ -16,11 +17,6 @@ constexpr double k_focal_px = 1000;  // 1 mm on the plane for each pixel
 
 // A plane of 0.4 x 0.3 m at z = 1 m in front of a pinhole projector at the origin.
 sim::World plane_world() {
-  auto mesh = std::make_shared<scene::Mesh>();
-  mesh->positions = {{-0.2f, -0.15f, 0}, {0.2f, -0.15f, 0}, {0.2f, 0.15f, 0}, {-0.2f, 0.15f, 0}};
-  mesh->normals.assign(4, {0, 0, -1});
-  mesh->triangles = {{0, 2, 1}, {0, 3, 2}};
-  mesh->triangle_materials = {0, 0};
   sim::World world;
   world.rig.projectors = {
       {"projector0", 640, 480, Lens::pinhole(k_focal_px, k_focal_px, 319.5, 239.5), Pose()}};
@@ -28,7 +24,7 @@ sim::World plane_world() {
   world.world_from_prototype = Pose(Eigen::Quaterniond::Identity(), {0, 0, k_distance_m});
   sim::Object prototype;
   prototype.name = "prototype";
-  prototype.mesh = mesh;
+  prototype.mesh = std::make_shared<scene::Mesh>(test::sheet(0.4, 0.3, 0, 1));
   prototype.world_from_object = world.world_from_prototype;
   world.objects = {prototype};
   return world;

@@ -17,6 +17,7 @@
 // X's macros must come last.
 #include "apps/calibrate.h"
 #include "tests/gui/x_person.h"
+#include "tests/support/display.h"
 #include "wizard/capture/virtual_capture.h"
 
 namespace limn::apps {
@@ -26,8 +27,6 @@ namespace fs = std::filesystem;
 using Eigen::Vector2d;
 using State = WizardState;
 using std::chrono::milliseconds;
-
-bool has_display() { return std::getenv("DISPLAY") != nullptr; }
 
 WizardView a_view() {
   WizardView view;
@@ -165,7 +164,7 @@ void leave(test::XPerson* x) {
 }
 
 TEST(WizardWindow, IsLeftAndGoesOnUntilTheRigIsGood) {
-  if (!has_display()) GTEST_SKIP() << "no display: WizardWindow.IsLeftAndGoesOnUntilTheRigIsGood";
+  if (!test::has_x_server()) GTEST_SKIP() << "no display: WizardWindow.IsLeftAndGoesOnUntilTheRigIsGood";
   const fs::path folder = test::test_folder(), out = folder / "rig";
   const CalibrateOptions options{.plan = test::small_plan(folder), .out = out};
   const auto with_person = [&](const std::function<void(test::XPerson*)>& acts) {
@@ -204,7 +203,7 @@ TEST(WizardWindow, IsLeftAndGoesOnUntilTheRigIsGood) {
 // The same with real devices' backend: the devices are checked, and a person carries the board from place to
 // place until three poses are captured; then a click leaves the wizard.
 TEST(WizardWindow, TakesPosesOfDevicesAndIsLeft) {
-  if (!has_display()) GTEST_SKIP() << "no display: WizardWindow.TakesPosesOfDevicesAndIsLeft";
+  if (!test::has_x_server()) GTEST_SKIP() << "no display: WizardWindow.TakesPosesOfDevicesAndIsLeft";
   const fs::path folder = test::test_folder(), out = folder / "rig";
   test::BoardRoom room(load_plan(test::small_plan(folder)).value(), 0.02);
   const CalibrateOptions options{.board = room.plan.board.text(), .out = out};
