@@ -456,5 +456,41 @@ TEST(House, IdentifiersKeepToTheGlossary) {
   EXPECT_GT(seen, 10000) << "the sources were not found";
 }
 
+// Names of functions that a piece of code declares or defines and that are only a verb of perception, which
+// does not say what is done to what.
+std::vector<std::string> vague_functions(const std::string& code) {
+  static const std::regex function(
+      R"([\w>&*]\s+[&*]?((?:\w+::)?(?:see|hear|tell|know|look|take))\([^;{}]*\)[^;{}()]*[;{])"),
+      keyword(R"(^(?:return|else|co_return)\b)");
+  std::vector<std::string> names;
+  for (std::sregex_iterator at(code.begin(), code.end(), function), end; at != end; ++at) {
+    const auto line = code.rfind('\n', static_cast<std::size_t>(at->position(1))) + 1;
+    const auto text = code.find_first_not_of(' ', line);
+    if (!std::regex_search(code.substr(text, 10), keyword)) names.push_back((*at)[1]);
+  }
+  return names;
+}
+
+TEST(House, AFunctionIsFoundByItsDeclaration) {
+  EXPECT_EQ(vague_functions("void tell(int at);\nbool Eye::see(const Frame& frame) {"),
+            (std::vector<std::string>{"tell", "Eye::see"}));
+  EXPECT_EQ(vague_functions("  return see(1);\n  a.take(b);\n  take_frames(c);\nvoid look_up(int a);"),
+            std::vector<std::string>());
+}
+
+TEST(House, FunctionsSayWhatTheyDoToWhat) {
+  int seen = 0;
+  for (const auto& [room, may] : allowed()) {
+    for (const fs::path& file : code_in(root() / room)) {
+      std::ifstream in(file);
+      ++seen;
+      for (const std::string& name : vague_functions(code_alone({std::istreambuf_iterator<char>(in), {}})))
+        ADD_FAILURE() << fs::relative(file, root()) << ": " << name
+                      << "() (docs/style.md: no function of this name)";
+    }
+  }
+  EXPECT_GT(seen, 400) << "the sources were not found";
+}
+
 }  // namespace
 }  // namespace limn
