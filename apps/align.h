@@ -5,7 +5,7 @@
 
 namespace limn::apps {
 
-struct AlignCommand : AlignOptions {
+struct AlignCommand : wizard::AlignOptions {
   bool json = false;  ///< Prints align.json instead of a line.
 };
 

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 using Say = std::function<void(const std::string&)>;
 
-ordered_json to_json(const PoseJudged& judged) {
+ordered_json to_json(const wizard::PoseJudged& judged) {
   ordered_json json = {{"pose", judged.pose}, {"captured_before", judged.before}};
   if (!judged.before) json["capture_s"] = judged.capture_s;
   if (!judged.assessment) {
@@ -38,7 +38,7 @@ ordered_json to_json(const PoseJudged& judged) {
   const calib::Assessment& assessment = *judged.assessment;
   json["verdict"] = calib::to_text(assessment.verdict);
   json["held_out_px"] = assessment.held_out.rms_px;
-  json["predicted_mm"] = predicted_mm(assessment);
+  json["predicted_mm"] = wizard::predicted_mm(assessment);
   for (const calib::DeviceQuality& device : assessment.devices)
     json["coverage"][device.name] = device.coverage;
   json["faults"] = ordered_json::array();
@@ -47,15 +47,15 @@ ordered_json to_json(const PoseJudged& judged) {
   return json;
 }
 
-std::string to_json(const Calibrated& done) {
+std::string to_json(const wizard::Calibrated& done) {
   ordered_json json = {{"verdict", calib::to_text(done.report.assessment.verdict)},
                        {"held_out_px", done.report.assessment.held_out.rms_px},
-                       {"predicted_mm", predicted_mm(done.report.assessment)},
+                       {"predicted_mm", wizard::predicted_mm(done.report.assessment)},
                        {"poses", ordered_json::array()},
                        {"capture_s", ordered_json::object()},
                        {"latency_ms", ordered_json::object()},
                        {"seconds", done.seconds}};
-  for (const PoseJudged& judged : done.poses) json["poses"].push_back(to_json(judged));
+  for (const wizard::PoseJudged& judged : done.poses) json["poses"].push_back(to_json(judged));
   for (const auto& [projector, seconds] : done.capture_s) json["capture_s"][projector] = seconds;
   for (const auto& [projector, seconds] : done.latency_s) json["latency_ms"][projector] = 1e3 * seconds;
   if (const auto& seen = done.prototype) {
@@ -70,7 +70,7 @@ std::string to_json(const Calibrated& done) {
   return json.dump(2) + "\n";
 }
 
-void say_end(const CalibrateOptions& options, const Calibrated& done, const Say& say) {
+void say_end(const CalibrateOptions& options, const wizard::Calibrated& done, const Say& say) {
   for (const calib::Fault& fault : done.report.assessment.faults)
     say(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
   for (const std::string& sentence : done.report.explanation.advice) say("advice: " + sentence);
@@ -78,7 +78,7 @@ void say_end(const CalibrateOptions& options, const Calibrated& done, const Say&
   for (const auto& [projector, seconds] : done.capture_s)
     times.push_back(fmt::format("{} {:.1f} s", projector, seconds));
   const auto taken = std::count_if(done.poses.begin(), done.poses.end(),
-                                   [](const PoseJudged& judged) { return !judged.before; });
+                                   [](const wizard::PoseJudged& judged) { return !judged.before; });
   say(fmt::format("captured {} of {} poses in this run; capture time on the cameras' clock: {}", taken,
                   done.poses.size(), fmt::join(times, ", ")));
   say(done.report.explanation.verdict);
@@ -97,11 +97,12 @@ std::string devices_in_words(const calib::CaptureSet& captures, const char* wher
 }
 
 // Nullopt if lines are wanted or there is no display.
-std::optional<GuiWindow> window_for(const CalibrateOptions& options, const Result<device::Desktop>& desktop) {
+std::optional<gui::GuiWindow> window_for(const CalibrateOptions& options,
+                                         const Result<device::Desktop>& desktop) {
   constexpr int k_width = 1600, k_height = 1000;
   if (options.terminal || options.json) return std::nullopt;
-  auto window = desktop ? GuiWindow::open(*desktop, "Limn calibration", k_width, k_height)
-                        : Result<GuiWindow>(desktop.error());
+  auto window = desktop ? gui::GuiWindow::open(*desktop, "Limn calibration", k_width, k_height)
+                        : Result<gui::GuiWindow>(desktop.error());
   if (window) return std::move(*window);
   log_info("calibrate: {} The wizard continues in the terminal.", window.message());
   return std::nullopt;
@@ -110,22 +111,23 @@ std::optional<GuiWindow> window_for(const CalibrateOptions& options, const Resul
 // Runs the wizard in a window or in the terminal, and prints the result.
 Status played(const CalibrateOptions& options,
               const std::string& plan_json,
-              const WizardPlan& plan,
-              const WizardBackend& backend,
-              std::optional<GuiWindow> window,
-              std::atomic<WizardWish>* wish,
-              MainThreadExecutor* executor) {
+              const wizard::WizardPlan& plan,
+              const wizard::WizardBackend& backend,
+              std::optional<gui::GuiWindow> window,
+              std::atomic<wizard::WizardWish>* wish,
+              wizard::MainThreadExecutor* executor) {
   const Say say = [&](const std::string& line) {
     if (options.json) return log_info("{}", line);
     fmt::print("{}\n", line);
     std::fflush(stdout);
   };
-  const WizardWork work = [&](const WizardBackend& where, const WizardListener& listener) {
-    return calibrated({options.out, options.scene, options.scan, options.all}, plan_json, plan.captures,
-                      plan.places, where, listener);
+  const wizard::WizardWork work = [&](const wizard::WizardBackend& where,
+                                      const wizard::WizardListener& listener) {
+    return wizard::calibrated({options.out, options.scene, options.scan, options.all}, plan_json,
+                              plan.captures, plan.places, where, listener);
   };
-  LIMN_TRY(const Calibrated done,
-           window ? calibrated_in_window(&*window, plan, backend, say, wish, executor, work)
+  LIMN_TRY(const wizard::Calibrated done,
+           window ? wizard::calibrated_in_window(&*window, plan, backend, say, wish, executor, work)
                   : work(backend, {.say = say}));
   say_end(options, done, say);
   if (options.json) fmt::print("{}", to_json(done));
@@ -134,28 +136,29 @@ Status played(const CalibrateOptions& options,
 
 Status calibrate_virtually(const CalibrateOptions& asked) {
   CalibrateOptions options = asked;
-  LIMN_TRY(const Plan plan, load_plan(options.plan));
-  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
-  LIMN_TRY(const std::string text, captured_plan(options.plan, plan.world));
+  LIMN_TRY(const wizard::Plan plan, wizard::load_plan(options.plan));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, tracker::marker_image));
+  LIMN_TRY(const std::string text, wizard::captured_plan(options.plan, plan.world));
   if (options.scene.empty() && world.scene) options.scene = world.scene->folder;
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   const std::vector<Imager> cameras = rig.world().rig.cameras;
-  LIMN_TRY(const calib::CaptureSet captures, planned(plan, rig, options.out / "captures"));
+  LIMN_TRY(const calib::CaptureSet captures, wizard::planned(plan, rig, options.out / "captures"));
   ImageWriter writer;
   rig.remove_prototype();
-  std::atomic<WizardWish> wish = WizardWish::none;
-  MainThreadExecutor executor;
-  return played(
-      options, text,
-      {captures, pose_instructions(cameras[0], plan.board, plan.world_from_board),
-       outlines(plan.board, plan.world_from_board, cameras), devices_in_words(captures, "virtual rig: ")},
-      virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()), &wish, &executor);
+  std::atomic<wizard::WizardWish> wish = wizard::WizardWish::none;
+  wizard::MainThreadExecutor executor;
+  return played(options, text,
+                {captures, wizard::pose_instructions(cameras[0], plan.board, plan.world_from_board),
+                 wizard::outlines(plan.board, plan.world_from_board, cameras),
+                 devices_in_words(captures, "virtual rig: ")},
+                wizard::virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()),
+                &wish, &executor);
 }
 
 // Lets another thread use a display of the main thread.
 class ErrandDisplay : public device::Display {
  public:
-  ErrandDisplay(std::unique_ptr<device::Display> display, MainThreadExecutor* executor)
+  ErrandDisplay(std::unique_ptr<device::Display> display, wizard::MainThreadExecutor* executor)
       : display_(std::move(display)), executor_(executor) {}
   const std::string& name() const override { return display_->name(); }
   cv::Size size() const override { return display_->size(); }
@@ -167,48 +170,48 @@ class ErrandDisplay : public device::Display {
 
  private:
   std::unique_ptr<device::Display> display_;
-  MainThreadExecutor* executor_;
+  wizard::MainThreadExecutor* executor_;
 };
 
 Status calibrate_devices(const CalibrateOptions& options) {
   if (const auto board = calib::Board::parse(options.board); !board)
     return usage_error("--board: {}", board.message());
-  LIMN_TRY(const Devices named, load_devices(options.devices));
+  LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(DeviceBackend::Devices devices, opened_devices(named, desktop));
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::opened_devices(named, desktop));
   return calibrate_on(options, std::move(devices), desktop);
 }
 
 }  // namespace
 
 Status calibrate_on(const CalibrateOptions& options,
-                    DeviceBackend::Devices devices,
+                    wizard::DeviceBackend::Devices devices,
                     const Result<device::Desktop>& desktop) {
   const auto board = calib::Board::parse(options.board);
   if (!board) return usage_error("--board: {}", board.message());
   const calib::CaptureSet captures =
-      calib::plan_captures(options.out / "captures", captured_devices(devices.cameras),
-                           captured_devices(devices.projectors), *board, options.code);
+      calib::plan_captures(options.out / "captures", wizard::captured_devices(devices.cameras),
+                           wizard::captured_devices(devices.projectors), *board, options.code);
   const calib::CapturedDevice& first = captures.cameras.front();
-  const Imager assumed = assumed_camera(first.name, first.width, first.height);
-  const std::vector<Pose> poses = guided_poses(assumed, *board);
-  auto targets = outlines(*board, poses, {assumed});
+  const Imager assumed = wizard::assumed_camera(first.name, first.width, first.height);
+  const std::vector<Pose> poses = wizard::guided_poses(assumed, *board);
+  auto targets = wizard::outlines(*board, poses, {assumed});
   for (auto& pose : targets)
     pose.resize(captures.cameras.size());  // the other cameras' poses are not known yet
   const auto targets_by = [&](const Rig& rig) {
-    return outlines(*board, placed_alike(poses, *board, assumed, rig), rig.cameras);
+    return wizard::outlines(*board, wizard::placed_alike(poses, *board, assumed, rig), rig.cameras);
   };
-  std::atomic<WizardWish> wish = WizardWish::none;
-  MainThreadExecutor executor;
-  std::optional<GuiWindow> window = window_for(options, desktop);
+  std::atomic<wizard::WizardWish> wish = wizard::WizardWish::none;
+  wizard::MainThreadExecutor executor;
+  std::optional<gui::GuiWindow> window = window_for(options, desktop);
   if (window)
     for (auto& display : devices.projectors)
       display = std::make_unique<ErrandDisplay>(std::move(display), &executor);
-  DeviceBackend device_backend(std::move(devices), *board, &wish);
+  wizard::DeviceBackend device_backend(std::move(devices), *board, &wish);
   ImageWriter writer;
-  return played(options, captured_plan(options.board, options.code, captures),
-                {captures, pose_instructions(assumed, *board, poses), targets, devices_in_words(captures, ""),
-                 targets_by},
+  return played(options, wizard::captured_plan(options.board, options.code, captures),
+                {captures, wizard::pose_instructions(assumed, *board, poses), targets,
+                 devices_in_words(captures, ""), targets_by},
                 device_backend.backend(&writer), std::move(window), &wish, &executor);
 }
 

@@ -31,7 +31,7 @@ Status run_calibrate(const CalibrateOptions& options);
 /// `limn calibrate` on devices that are already open (`options.devices` is not read), in a window of
 /// `desktop` under the same conditions as run_calibrate(). The displays are used by the calling thread alone.
 Status calibrate_on(const CalibrateOptions& options,
-                    DeviceBackend::Devices devices,
+                    wizard::DeviceBackend::Devices devices,
                     const Result<device::Desktop>& desktop);
 
 }  // namespace limn::apps

@@ -10,10 +10,10 @@
 namespace limn::apps {
 
 Status run_capture(const CaptureOptions& options) {
-  LIMN_TRY(const Plan plan, load_plan(options.plan));
-  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
+  LIMN_TRY(const wizard::Plan plan, wizard::load_plan(options.plan));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, tracker::marker_image));
   sim::VirtualRig rig(std::move(world));
-  LIMN_TRY_STATUS(capture_virtually(plan, &rig, options.out));
+  LIMN_TRY_STATUS(wizard::capture_virtually(plan, &rig, options.out));
   fmt::print("{} poses in {}\n", plan.world_from_board.size(), options.out.string());
   return {};
 }

@@ -33,11 +33,11 @@ Result<std::vector<fs::path>> shipped_checks() {
 }
 
 // All checks are read before the first one runs, so that a broken file is reported at once.
-Result<std::vector<Check>> read_checks(const std::vector<fs::path>& files) {
-  std::vector<Check> checks;
+Result<std::vector<validate::Check>> read_checks(const std::vector<fs::path>& files) {
+  std::vector<validate::Check> checks;
   std::map<std::string, std::string> known;
   for (const fs::path& file : files) {
-    LIMN_TRY(Check check, load_check(file));
+    LIMN_TRY(validate::Check check, validate::load_check(file));
     const auto [earlier, fresh] = known.emplace(check.name, file.string());
     if (!fresh) {
       return usage_error(
@@ -50,13 +50,14 @@ Result<std::vector<Check>> read_checks(const std::vector<fs::path>& files) {
   return checks;
 }
 
-nlohmann::ordered_json json_of(const std::vector<CheckResult>& results, const std::string& renderer) {
+nlohmann::ordered_json json_of(const std::vector<validate::CheckResult>& results,
+                               const std::string& renderer) {
   nlohmann::ordered_json json = {{"schema", "limn.check-report/1"}, {"renderer", renderer}};
   json["passed"] = std::all_of(results.begin(), results.end(), [](const auto& r) { return r.good(); });
   json["checks"] = nlohmann::ordered_json::array();
-  for (const CheckResult& result : results) {
+  for (const validate::CheckResult& result : results) {
     nlohmann::ordered_json readings = nlohmann::ordered_json::array();
-    for (const CheckReading& reading : result.readings) {
+    for (const validate::CheckReading& reading : result.readings) {
       readings.push_back({{"measure", reading.limit.measure.name},
                           {"value", reading.value},
                           {reading.limit.measure.least ? "at_least" : "at_most", reading.limit.value},
@@ -71,11 +72,11 @@ nlohmann::ordered_json json_of(const std::vector<CheckResult>& results, const st
   return json;
 }
 
-Status write_images(const CheckResult& result, const fs::path& out) {
+Status write_images(const validate::CheckResult& result, const fs::path& out) {
   if (result.images.empty()) return {};
   const fs::path folder = out / result.name;
   LIMN_TRY_STATUS(make_folder(folder));
-  for (const CheckImage& image : result.images) {
+  for (const validate::CheckImage& image : result.images) {
     LIMN_TRY_STATUS(write_png(folder / (image.file + "-actual.png"), image.actual));
     LIMN_TRY_STATUS(write_png(folder / (image.file + "-expected.png"), image.expected));
     LIMN_TRY_STATUS(write_png(folder / (image.file + "-difference.png"), image.difference));
@@ -84,7 +85,7 @@ Status write_images(const CheckResult& result, const fs::path& out) {
 }
 
 // Share of an image's pixels that differ by more than two levels from another run's image.
-Result<double> share_apart(const CheckImage& image, const fs::path& theirs) {
+Result<double> share_apart(const validate::CheckImage& image, const fs::path& theirs) {
   constexpr double k_same_levels = 2;
   LIMN_TRY(const cv::Mat expected, read_image(theirs));
   if (expected.size() != image.actual.size() || expected.type() != image.actual.type())
@@ -99,12 +100,12 @@ Result<double> share_apart(const CheckImage& image, const fs::path& theirs) {
 }
 
 // Adds one reading: the largest difference of an image from the run in `against`.
-void compare(const fs::path& against, CheckResult* result) {
-  static const CheckMeasure measure = {"apart_share",
-                                       "pixels that differ by more than two levels from the other run", ""};
+void compare(const fs::path& against, validate::CheckResult* result) {
+  static const validate::CheckMeasure measure = {
+      "apart_share", "pixels that differ by more than two levels from the other run", ""};
   constexpr double k_most = 0.001;
   double worst = 0;
-  for (const CheckImage& image : result->images) {
+  for (const validate::CheckImage& image : result->images) {
     const auto share = share_apart(image, against / result->name / (image.file + "-actual.png"));
     if (!share) {
       result->problem = share.message();
@@ -115,10 +116,10 @@ void compare(const fs::path& against, CheckResult* result) {
   if (!result->images.empty()) result->readings.push_back({{measure, k_most}, worst});
 }
 
-Status verdict_of(const std::vector<CheckResult>& results, const fs::path& page) {
+Status verdict_of(const std::vector<validate::CheckResult>& results, const fs::path& page) {
   std::vector<std::string> failed;
   std::string problems;
-  for (const CheckResult& result : results) {
+  for (const validate::CheckResult& result : results) {
     if (!result.good()) failed.push_back(result.name);
     if (!result.problem.empty()) problems += "\n  " + result.problem;
   }
@@ -134,17 +135,17 @@ Status run_check(const CheckOptions& options) {
   if (files.empty()) {
     LIMN_TRY(files, shipped_checks());
   }
-  LIMN_TRY(const std::vector<Check> checks, read_checks(files));
+  LIMN_TRY(const std::vector<validate::Check> checks, read_checks(files));
   if (!options.against.empty() && !fs::is_directory(options.against))
     return error("{}: expected the folder of another run (its --out), found none.", options.against.string());
   LIMN_TRY_STATUS(make_folder(options.out));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("check: {}", context.description());
-  std::vector<CheckResult> results;
-  for (const Check& check : checks) {
+  std::vector<validate::CheckResult> results;
+  for (const validate::Check& check : checks) {
     log_info("{} ...", check.name);
-    auto result = judged(check);
-    if (!result) result = CheckResult{check.name, check.about, {}, {}, 0, result.message()};
+    auto result = validate::judged(check);
+    if (!result) result = validate::CheckResult{check.name, check.about, {}, {}, 0, result.message()};
     if (!options.against.empty()) compare(options.against, &*result);
     LIMN_TRY_STATUS(write_images(*result, options.out));
     results.push_back(std::move(*result));
@@ -152,11 +153,11 @@ Status run_check(const CheckOptions& options) {
   const auto json = json_of(results, context.description());
   LIMN_TRY_STATUS(write_file(options.out / "check.json", json.dump(2) + "\n"));
   const fs::path page = options.out / "check.html";
-  LIMN_TRY_STATUS(write_check_page(results, context.description(), page));
+  LIMN_TRY_STATUS(validate::write_check_page(results, context.description(), page));
   if (options.json) {
     fmt::print("{}\n", json.dump(2));
   } else {
-    fmt::print("{}{}\n", check_table(results), page.string());
+    fmt::print("{}{}\n", validate::check_table(results), page.string());
   }
   return verdict_of(results, page);
 }

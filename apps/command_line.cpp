@@ -259,7 +259,7 @@ void add_solve(CLI::App& app, Run& run) {
       "Example: limn solve captures --out rig\n"
       "Example: limn solve photos --import opencv-gray --projector 1024x768 --board chessboard:9x7:75mm "
       "--poses 'capture_*' --shots 'graycode_*.png' --out rig");
-  auto options = std::make_shared<SolveCommandOptions>();
+  auto options = std::make_shared<wizard::SolveCommandOptions>();
   command->add_option("captures", options->captures, "Captures folder")->required();
   command->add_option("--out", options->out, "Rig folder to write")->required();
   command
@@ -281,7 +281,7 @@ void add_solve(CLI::App& app, Run& run) {
       ->allow_extra_args(false);
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print report.json instead of a table");
-  add_choice(command, "--import", &options->import_format, k_import_formats,
+  add_choice(command, "--import", &options->import_format, wizard::k_import_formats,
              "Read captures of another program: opencv-gray");
   command->add_option("--projector", options->projector,
                       "With --import: size of the projector in pixels, such as 1024x768");
@@ -560,9 +560,9 @@ void add_export(CLI::App& app, Run& run) {
       "Example: limn export --mpcdi door.mpcdi --rig rig --scene config/scenes/door --poses poses.json\n"
       "Example: limn export --warp warps --format exr --rig rig --scene config/scenes/door --poses "
       "poses.json");
-  auto options = std::make_shared<ExportOptions>();
+  auto options = std::make_shared<exchange::ExportOptions>();
   command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write");
-  add_choice(command, "--profile", &options->profile, k_written_mpcdi_profiles,
+  add_choice(command, "--profile", &options->profile, exchange::k_written_mpcdi_profiles,
              "MPCDI profile: sl (shader lamps), a3 (advanced 3D) or 3d (one viewer)");
   command->add_option("--gamma", options->gamma, "Gamma of the alpha maps (gammaEmbedded); 1 is linear")
       ->capture_default_str();
@@ -570,7 +570,7 @@ void add_export(CLI::App& app, Run& run) {
       ->capture_default_str();
   command->add_option("--warp", options->warp,
                       "Folder for warp-PROJECTOR.pfm or .exr, the points that the pixels light");
-  add_choice(command, "--format", &options->format, k_warp_formats,
+  add_choice(command, "--format", &options->format, exchange::k_warp_formats,
              "File format of --warp: pfm or exr (R, G, B are x, y, z)");
   command->add_option("--looks", options->looks,
                       "Folder for look-SLOT-VARIANT.png, each variant as the viewer sees it");

@@ -20,22 +20,22 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Status write_results(const fs::path& out, const DemoResult& result) {
-  for (const DemoImage& image : result.images) {
+Status write_results(const fs::path& out, const validate::DemoResult& result) {
+  for (const validate::DemoImage& image : result.images) {
     LIMN_TRY_STATUS(write_png(out / (image.file + ".png"), image.image));
   }
   LIMN_TRY_STATUS(write_file(out / "demo.json", result.json));
-  const DemoPage page{
+  const validate::DemoPage page{
       "A whole session on a virtual rig whose ground truth is known. Two projectors and a camera were "
       "calibrated from simulated captures, the markers were found in a simulated photograph, the parts were "
       "projected onto the door, and a ray tracer that shares no code with the renderer measured where the "
       "light fell.",
       result.rows, result.images};
-  return write_demo_page(page, out / "demo.html");
+  return validate::write_demo_page(page, out / "demo.html");
 }
 
 // Shows the images in turn; space shows the next one at once, Escape ends.
-void show_in(device::Window& window, const std::vector<DemoImage>& images) {
+void show_in(device::Window& window, const std::vector<validate::DemoImage>& images) {
   constexpr double k_seconds_each = 4;
   auto shown_at = std::chrono::steady_clock::time_point();
   for (std::size_t i = 0; window.is_open();) {
@@ -57,9 +57,9 @@ Status run_demo(const DemoOptions& options) {
   if (options.window) {
     LIMN_TRY(window, device::Window::open("Limn demo", 1280, 720));
   }
-  LIMN_TRY(const DemoResult result, play_demo(options.out, options.keep_captures));
+  LIMN_TRY(const validate::DemoResult result, validate::play_demo(options.out, options.keep_captures));
   LIMN_TRY_STATUS(write_results(options.out, result));
-  fmt::print("{}\n{}\n", text_table(result.rows), (options.out / "demo.html").string());
+  fmt::print("{}\n{}\n", validate::text_table(result.rows), (options.out / "demo.html").string());
   std::fflush(stdout);
   if (window) show_in(*window, result.images);
   return {};

@@ -180,7 +180,7 @@ Finding tested(const std::string& area, const device::CameraConfig& wanted) {
 
 // All cameras that are connected or answer, except those of the file, which are tested with the file's
 // settings.
-Findings cameras(const Devices& devices) {
+Findings cameras(const device::Devices& devices) {
   const auto named = [&](const std::string& source) {
     return std::any_of(devices.cameras.begin(), devices.cameras.end(),
                        [&](const device::CameraConfig& camera) { return camera.source == source; });
@@ -209,9 +209,9 @@ Findings show_signs(const std::vector<std::unique_ptr<device::Display>>& shown, 
     for (std::size_t i = 0; i < shown.size(); ++i) {
       device::Display& display = *shown[i];
       const int number = static_cast<int>(i) + 1;
-      const auto done = display.show(output_sign(display.size(), number, display.name()));
+      const auto done = display.show(device::output_sign(display.size(), number, display.name()));
       findings[i] = {"displays", display.name(), State::works,
-                     fmt::format("shows the number {} on {}", number, sign_colour(number)), ""};
+                     fmt::format("shows the number {} on {}", number, device::sign_colour(number)), ""};
       if (!done) findings[i] = failed("displays", display.name(), done.message());
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
@@ -224,7 +224,9 @@ void add(Findings* findings, const Findings& more) {
 }
 
 // The displays of the file, or all monitors. Displays that cannot be opened are reported.
-Findings signs(const DoctorOptions& options, const Devices& devices, const Result<device::Desktop>& desktop) {
+Findings signs(const DoctorOptions& options,
+               const device::Devices& devices,
+               const Result<device::Desktop>& desktop) {
   const device::Desktop* there = desktop ? &*desktop : nullptr;
   std::vector<device::DisplayConfig> wanted = devices.displays;
   if (options.devices.empty() && options.show_s > 0 && there)
@@ -249,12 +251,12 @@ Findings signs(const DoctorOptions& options, const Devices& devices, const Resul
   return findings;
 }
 
-Result<Devices> wanted_devices(const DoctorOptions& options) {
-  if (options.devices.empty()) return Devices{};
-  LIMN_TRY(const Devices devices, load_devices(options.devices));
+Result<device::Devices> wanted_devices(const DoctorOptions& options) {
+  if (options.devices.empty()) return device::Devices{};
+  LIMN_TRY(const device::Devices devices, device::load_devices(options.devices));
   if (options.rig.empty()) return devices;
   LIMN_TRY(const Rig rig, load_rig(options.rig));
-  return matched(devices, rig);
+  return device::matched(devices, rig);
 }
 
 const char* word(State state) {
@@ -288,7 +290,7 @@ std::vector<Finding> examined(const DoctorOptions& options) {
   Findings findings = {packages(options), clock_of_session(), gl()};
   auto devices = wanted_devices(options);
   if (!devices) findings.push_back(failed("devices", "file", devices.message()));
-  const Devices wanted = devices ? *devices : Devices{};
+  const device::Devices wanted = devices ? *devices : device::Devices{};
   const bool desktop_asked_for =
       (options.devices.empty() && options.show_s > 0) ||
       std::any_of(wanted.displays.begin(), wanted.displays.end(), device::needs_desktop);

@@ -16,7 +16,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json report_of(const ExportJob& job) {
+ordered_json report_of(const exchange::ExportJob& job) {
   ordered_json json;
   json["schema"] = "limn.export/1";
   json["projectors"] = ordered_json::array();
@@ -46,16 +46,16 @@ void print(const ordered_json& report) {
 
 }  // namespace
 
-Status run_export(const ExportOptions& options, bool is_json) {
-  LIMN_TRY_STATUS(check_export(options));
-  LIMN_TRY(ExportJob job, load_export_job(options));
+Status run_export(const exchange::ExportOptions& options, bool is_json) {
+  LIMN_TRY_STATUS(exchange::check_export(options));
+  LIMN_TRY(exchange::ExportJob job, exchange::load_export_job(options));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("export: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(job.scene, job.rig));
   const scene::PosedScene bare{job.posed.world_from_prototype, {}};
   int lit = 0;
   for (std::size_t i = 0; i < job.rig.projectors.size(); ++i) {
-    job.maps.push_back(projector_maps(&renderer, i, bare));
+    job.maps.push_back(exchange::projector_maps(&renderer, i, bare));
     lit += job.maps.back().lit;
     if (job.maps.back().lit == 0)
       log_warning("export: {} does not reach the prototype; its maps are empty", job.rig.projectors[i].name);
@@ -64,7 +64,7 @@ Status run_export(const ExportOptions& options, bool is_json) {
     return error("{}: expected a prototype that a projector reaches, found none. Check rig and poses.",
                  options.poses.string());
   }
-  for (const Exporter& exporter : exporters())
+  for (const exchange::Exporter& exporter : exchange::exporters())
     if (exporter.is_asked_for(options)) LIMN_TRY_STATUS(exporter.write(job, options));
   const ordered_json report = report_of(job);
   if (is_json) {

@@ -8,6 +8,6 @@ namespace limn::apps {
 /// `limn export`: warp and blend maps of every projector for other programs. At least one of `mpcdi`, `warp`
 /// and `looks` must be set. All points are in the frame of the prototype's mesh, in metres. `is_json`: prints
 /// JSON instead of a line for each projector.
-Status run_export(const ExportOptions& options, bool is_json = false);
+Status run_export(const exchange::ExportOptions& options, bool is_json = false);
 
 }  // namespace limn::apps

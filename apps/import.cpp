@@ -41,20 +41,20 @@ std::string sentence_of(const ordered_json& region) {
 }  // namespace
 
 Status run_import(const ImportOptions& options) {
-  LIMN_TRY(const Mpcdi mpcdi, read_mpcdi(options.file));
+  LIMN_TRY(const exchange::Mpcdi mpcdi, exchange::read_mpcdi(options.file));
   if (!options.out.empty()) {
-    LIMN_TRY(const Rig rig, mpcdi_rig(mpcdi, options.file.string()));
+    LIMN_TRY(const Rig rig, exchange::mpcdi_rig(mpcdi, options.file.string()));
     LIMN_TRY_STATUS(save_rig(rig, options.out));
   }
   for (const std::string& remark : mpcdi.remarks) log_warning("import: {}", remark);
-  const ordered_json report = mpcdi_report(mpcdi);
+  const ordered_json report = exchange::mpcdi_report(mpcdi);
   if (options.json) {
     fmt::print("{}\n", report.dump(2));
     return {};
   }
-  fmt::print("MPCDI {}, profile {}, {} region{}{}\n", mpcdi.version, k_mpcdi_profiles.text(mpcdi.profile),
-             mpcdi.regions.size(), mpcdi.regions.size() == 1 ? "" : "s",
-             mpcdi.made_by.empty() ? "" : ", made by " + mpcdi.made_by);
+  fmt::print("MPCDI {}, profile {}, {} region{}{}\n", mpcdi.version,
+             exchange::k_mpcdi_profiles.text(mpcdi.profile), mpcdi.regions.size(),
+             mpcdi.regions.size() == 1 ? "" : "s", mpcdi.made_by.empty() ? "" : ", made by " + mpcdi.made_by);
   for (const auto& region : report["regions"]) fmt::print("{}\n", sentence_of(region));
   return {};
 }

@@ -67,7 +67,7 @@ Status check_options(const LiveOptions& options) {
 // The virtual room's true content, and what the session knows about it.
 struct Stage {
   sim::World world;
-  SessionSetup setup;
+  session::SessionSetup setup;
   std::vector<scene::SkippedVariant> skipped_variants;
 };
 
@@ -80,11 +80,11 @@ Result<Stage> virtual_stage(const LiveOptions& options) {
   if (options.rig.empty() || !options.world.empty()) {
     const fs::path world =
         options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
-    LIMN_TRY(stage.world, sim::load_world(world, marker_image, &stage.skipped_variants));
+    LIMN_TRY(stage.world, sim::load_world(world, tracker::marker_image, &stage.skipped_variants));
     if (!stage.world.scene)
       return error("{}: scene: expected a scene for a session, found none.", world.string());
   } else {
-    LIMN_TRY(stage.world, room_for(stage.setup.rig, stage.setup.scene));
+    LIMN_TRY(stage.world, session::room_for(stage.setup.rig, stage.setup.scene));
   }
   if (const Status coarser = scale_resolution(options.resolution, &stage.world.rig); !coarser)
     return usage_error("--resolution: {}", coarser.message());
@@ -119,7 +119,7 @@ Status check_fits(const Rig& rig, const Rig& devices) {
 }
 
 // Copies the options into the setup, except those for devices and virtual rig.
-Status set_up(const LiveOptions& options, SessionSetup* setup) {
+Status set_up(const LiveOptions& options, session::SessionSetup* setup) {
   setup->paint.prediction = options.prediction;
   setup->paint.marker_light = options.marker_light;
   setup->paint.refill = options.refill;
@@ -129,7 +129,8 @@ Status set_up(const LiveOptions& options, SessionSetup* setup) {
 }
 
 // Opens the remote; null if it is not asked for.
-Result<std::unique_ptr<remote::Server>> served(const LiveOptions& options, const SessionSetup& setup) {
+Result<std::unique_ptr<remote::Server>> served(const LiveOptions& options,
+                                               const session::SessionSetup& setup) {
   if (options.serve.empty()) return std::unique_ptr<remote::Server>();
   if (!options.serve_show.empty() && !find_named(setup.rig.projectors, options.serve_show))
     return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.",
@@ -146,7 +147,7 @@ Result<std::unique_ptr<remote::Server>> served(const LiveOptions& options, const
   return server;
 }
 
-Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
+session::Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
   return {[context] { return !*context || (*context)->is_lost(); },
           [context]() -> Status {
             context->reset();
@@ -158,26 +159,26 @@ Session::Drawing drawing_in(std::optional<device::GlContext>* context) {
 // Opens everything that sessions on devices and on the virtual rig have in common, calls `play`, and closes
 // it. `setup` becomes what a replay will read.
 Status played(const LiveOptions& options,
-              SessionSetup setup,
+              session::SessionSetup setup,
               std::span<const scene::SkippedVariant> skipped_variants,
               const device::Desktop* desktop,
-              const std::function<Status(const SessionParts&, Keys*)>& play) {
+              const std::function<Status(const session::SessionParts&, session::Keys*)>& play) {
   std::optional<device::GlContext> context;
   LIMN_TRY(context, device::GlContext::create());
   log_info("live: {}", context->description());
-  LIMN_TRY(OscPort osc, OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to));
   LIMN_TRY(const std::unique_ptr<remote::Server> server, served(options, setup));
-  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, options.record, &setup));
-  report_skipped(skipped_variants, {}, &output.telemetry());
-  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
-  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), output.recorder()));
+  LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, options.record, &setup));
+  session::report_skipped(skipped_variants, {}, &output.telemetry());
+  LIMN_TRY(session::Perception perception, session::Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(session::Session session, session::Session::create(setup, &output.telemetry(), output.recorder()));
   session.survive_losses(drawing_in(&context));
-  std::optional<OperatorConsole> console;
+  std::optional<session::OperatorConsole> console;
   if (options.window) {
-    LIMN_TRY(console, OperatorConsole::open(*desktop, setup.scene));
+    LIMN_TRY(console, session::OperatorConsole::open(*desktop, setup.scene));
     if (server) console->invite(server.get());
   }
-  SessionParts parts{perception, session, output, {&osc}};
+  session::SessionParts parts{perception, session, output, {&osc}};
   if (server) parts.clients.push_back(server.get());
   if (console) parts.clients.push_back(&*console);
   LIMN_TRY_STATUS(play(parts, console ? &console->keys() : nullptr));
@@ -187,9 +188,10 @@ Status played(const LiveOptions& options,
 }
 
 Status play_in_virtual_room(const LiveOptions& options) {
-  LIMN_TRY(Script script, options.script.empty() ? Result<Script>(Script{}) : load_script(options.script));
+  LIMN_TRY(session::Script script, options.script.empty() ? Result<session::Script>(session::Script{})
+                                                          : session::load_script(options.script));
   LIMN_TRY(Stage stage, virtual_stage(options));
-  SessionSetup& setup = stage.setup;
+  session::SessionSetup& setup = stage.setup;
   LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera = !stage.world.camera_effects.front().srgb;
@@ -197,18 +199,18 @@ Status play_in_virtual_room(const LiveOptions& options) {
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
                                             : std::numeric_limits<double>::infinity();
-  sim::VirtualRig rig(std::move(stage.world), {.display_delay_s = k_virtual_display_s,
-                                               .camera_delay_s = k_virtual_camera_s,
+  sim::VirtualRig rig(std::move(stage.world), {.display_delay_s = session::k_virtual_display_s,
+                                               .camera_delay_s = session::k_virtual_camera_s,
                                                .frame_period_s = options.frame_period_s,
                                                .grab_waits_for_light = false});
-  LIMN_TRY(ScriptedRoom room, ScriptedRoom::create(std::move(script), &rig));
+  LIMN_TRY(session::ScriptedRoom room, session::ScriptedRoom::create(std::move(script), &rig));
   std::optional<device::Desktop> desktop;
   if (options.window) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
   return played(options, setup, stage.skipped_variants, desktop ? &*desktop : nullptr,
-                [&](const SessionParts& parts, Keys*) {
-                  return play_virtually(end_s, g_is_ended, &rig, &room, parts);
+                [&](const session::SessionParts& parts, session::Keys*) {
+                  return session::play_virtually(end_s, g_is_ended, &rig, &room, parts);
                 });
 }
 
@@ -217,8 +219,10 @@ bool is_projector(const Rig& rig, const std::string& display) {
 }
 
 // Opens the devices. Those that cannot be opened are reported and left out.
-SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desktop* desktop) {
-  SessionDevices out;
+session::SessionDevices opened(const device::Devices& devices,
+                               const Rig& rig,
+                               const device::Desktop* desktop) {
+  session::SessionDevices out;
   const auto miss = [&out](const std::string& name, const char* kind, const std::string& why) {
     log_warning("live: {}: {} The session continues without it.", name, why);
     out.missing.push_back({.name = name, .kind = kind, .works = false, .why = why});
@@ -248,12 +252,12 @@ SessionDevices opened(const Devices& devices, const Rig& rig, const device::Desk
 }
 
 Status play_with_devices(const LiveOptions& options) {
-  LIMN_TRY(const Devices named, load_devices(options.devices));
-  SessionSetup setup;
+  LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
+  session::SessionSetup setup;
   LIMN_TRY(setup.rig, load_rig(options.rig));
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
-  LIMN_TRY(const Devices devices, matched(named, setup.rig));
+  LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));
   for (const device::DisplayConfig& display : devices.displays)
     if (!is_projector(setup.rig, display.name)) setup.screens.push_back(display.name);
   LIMN_TRY_STATUS(set_up(options, &setup));
@@ -264,11 +268,11 @@ Status play_with_devices(const LiveOptions& options) {
       std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
-  SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
+  session::SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
   return played(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
-                [&](const SessionParts& parts, Keys* keys) {
+                [&](const session::SessionParts& parts, session::Keys* keys) {
                   open.chosen = keys;
-                  return play_on_devices(&open, options.seconds, g_is_ended, parts);
+                  return session::play_on_devices(&open, options.seconds, g_is_ended, parts);
                 });
 }
 

@@ -11,13 +11,13 @@
 namespace limn::apps {
 
 Status run_markers(const MarkersOptions& options) {
-  if (!options.compare.empty()) return compare_templates(options.compare, options.json);
-  if (!options.train.empty()) return train_template(options.train, options.out);
+  if (!options.compare.empty()) return exchange::compare_templates(options.compare, options.json);
+  if (!options.train.empty()) return exchange::train_template(options.train, options.out);
   if (!options.mount.empty()) {
     if (!options.board.empty())
       return usage_error("--mount: expected a marker, found --board with it. Leave --board out.");
-    LIMN_TRY_STATUS(
-        run_mount({options.size_mm, margin_mm(options.size_mm), options.paper_mm, options.mount}));
+    LIMN_TRY_STATUS(exchange::run_mount(
+        {options.size_mm, exchange::margin_mm(options.size_mm), options.paper_mm, options.mount}));
     if (options.out.empty()) return {};
   }
   const std::string extension = options.out.extension().string();
@@ -26,12 +26,12 @@ Status run_markers(const MarkersOptions& options) {
     return usage_error("--out: expected a file that ends in .pdf or .svg (or .png for a board), found '{}'.",
                        options.out.string());
   if (for_board) {
-    LIMN_TRY(const std::string board, write_board_sheet(options.board, options.out));
+    LIMN_TRY(const std::string board, exchange::write_board_sheet(options.board, options.out));
     fmt::print("{} in {}\n", board, options.out.string());
     return {};
   }
-  LIMN_TRY(const MarkerSheet sheet,
-           write_marker_sheet({options.family, options.ids, options.size_mm, options.out}));
+  LIMN_TRY(const exchange::MarkerSheet sheet,
+           exchange::write_marker_sheet({options.family, options.ids, options.size_mm, options.out}));
   fmt::print("{} markers on {} page{} in {}\n", sheet.markers, sheet.pages, sheet.pages == 1 ? "" : "s",
              options.out.string());
   return {};

@@ -23,7 +23,7 @@ Status write_images(const std::filesystem::path& out, int count, const std::func
   return {};
 }
 
-Status write_response(const PatternsOptions& options, const PixelSize& size) {
+Status write_response(const PatternsOptions& options, const wizard::PixelSize& size) {
   const int count = static_cast<int>(calib::response_images().size());
   LIMN_TRY_STATUS(write_images(options.out, count,
                                [&](int i) { return calib::draw_response(i, size.width, size.height); }));
@@ -51,7 +51,7 @@ Result<calib::Patterns> by_response(const PatternsOptions& options, const calib:
 }  // namespace
 
 Status run_patterns(const PatternsOptions& options) {
-  LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
+  LIMN_TRY(const wizard::PixelSize size, wizard::parse_pixel_size(options.projector));
   const auto plain = calib::Patterns::create(options.code, size.width, size.height, options.code_options);
   if (!plain) return usage_error("{}", plain.message());
   if (options.response) return write_response(options, size);

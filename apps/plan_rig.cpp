@@ -10,20 +10,20 @@
 namespace limn::apps {
 
 Status run_plan_rig(const PlanRigOptions& options) {
-  LIMN_TRY(const DescribedRig described, load_described(options.described));
-  auto predicted_accuracy = predict_accuracy(described);
+  LIMN_TRY(const design::DescribedRig described, design::load_described(options.described));
+  auto predicted_accuracy = design::predict_accuracy(described);
   if (!predicted_accuracy)
     return error("{}: this rig cannot be calibrated: {}", options.described.string(),
                  predicted_accuracy.message());
   if (options.json) {
-    fmt::print("{}\n", design_json(*predicted_accuracy));
+    fmt::print("{}\n", design::design_json(*predicted_accuracy));
   } else {
-    fmt::print("{}", design_table(*predicted_accuracy, described));
+    fmt::print("{}", design::design_table(*predicted_accuracy, described));
   }
   if (!options.out.empty()) {
     LIMN_TRY_STATUS(make_folder(options.out));
-    LIMN_TRY_STATUS(write_file(options.out / "plan.json", design_json(*predicted_accuracy) + "\n"));
-    LIMN_TRY_STATUS(write_file(options.out / "plan.html", plan_page(described, *predicted_accuracy)));
+    LIMN_TRY_STATUS(write_file(options.out / "plan.json", design::design_json(*predicted_accuracy) + "\n"));
+    LIMN_TRY_STATUS(write_file(options.out / "plan.html", design::plan_page(described, *predicted_accuracy)));
   }
   return {};
 }

@@ -26,7 +26,7 @@ constexpr double k_images_a_second = 10;  // shown, settled and photographed by 
 constexpr double k_most_seconds = 15;
 
 // As many poses as fit into the time that a recheck may take, at least one.
-size_t affordable_poses(const Plan& plan, const Rig& rig) {
+size_t affordable_poses(const wizard::Plan& plan, const Rig& rig) {
   int images = 0;
   for (const Imager& projector : rig.projectors) {
     if (const auto patterns =
@@ -37,31 +37,31 @@ size_t affordable_poses(const Plan& plan, const Rig& rig) {
 }
 
 Status captured_virtually(const RecheckCommand& command, const fs::path& folder) {
-  LIMN_TRY(Plan plan, load_plan(command.plan));
+  LIMN_TRY(wizard::Plan plan, wizard::load_plan(command.plan));
   plan.code_options.inverses =
       false;  // the rig is almost known, so half the images are enough, and more devices fit into the time
-  LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
+  LIMN_TRY(sim::World world, sim::load_world(plan.world, tracker::marker_image));
   if (command.prototype && !world.scene)
     return error("{}: scene: expected a prototype for --prototype, found none.", plan.world.string());
   plan.world_from_board.resize(std::min(plan.world_from_board.size(), affordable_poses(plan, world.rig)));
   sim::VirtualRig rig(std::move(world));
-  if (!command.prototype) return capture_virtually(plan, &rig, folder);
-  return capture_prototype(plan, {rig.world().world_from_prototype}, &rig, folder);
+  if (!command.prototype) return wizard::capture_virtually(plan, &rig, folder);
+  return wizard::capture_prototype(plan, {rig.world().world_from_prototype}, &rig, folder);
 }
 
 Status captured_by_devices(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
-  LIMN_TRY(const Devices all, load_devices(command.devices));
-  LIMN_TRY(const Devices named, matched(all, rig));
+  LIMN_TRY(const device::Devices all, device::load_devices(command.devices));
+  LIMN_TRY(const device::Devices named, device::matched(all, rig));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(DeviceBackend::Devices devices, opened_devices(named, desktop));
-  LIMN_TRY(const calib::Board board, calibration_board(rig));
-  const calib::CaptureSet captures =
-      calib::plan_captures(folder, captured_devices(devices.cameras), captured_devices(devices.projectors),
-                           board, calib::PatternCode::gray, {.inverses = false});
-  DeviceBackend stage(std::move(devices), board, nullptr);
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::opened_devices(named, desktop));
+  LIMN_TRY(const calib::Board board, wizard::calibration_board(rig));
+  const calib::CaptureSet captures = calib::plan_captures(folder, wizard::captured_devices(devices.cameras),
+                                                          wizard::captured_devices(devices.projectors), board,
+                                                          calib::PatternCode::gray, {.inverses = false});
+  wizard::DeviceBackend stage(std::move(devices), board, nullptr);
   ImageWriter writer;
-  return captured_once(captures, rig, stage.backend(&writer));
+  return wizard::captured_once(captures, rig, stage.backend(&writer));
 }
 
 // The captures folder that the command names, or that it captures now.
@@ -91,7 +91,7 @@ Status write_rig(const calib::RigCheck& result, const RecheckCommand& command) {
   return write_file(command.out / "response.json", content);
 }
 
-void print_table(const Rechecked& checked) {
+void print_table(const wizard::Rechecked& checked) {
   const calib::RigCheck& result = checked.result;
   fmt::print("{:<14} {:>12} {:>10} {:>10}\n", "device", "observations", "before px", "after px");
   for (const calib::CheckedDevice& device : result.devices) {
@@ -106,14 +106,14 @@ void print_table(const Rechecked& checked) {
                move.device, move.degrees, move.degrees_stddev, move.mm, move.mm_stddev, move.px,
                move.mm_on_board);
   if (result.board_moved) fmt::print("the board has been moved: --still is not used\n");
-  fmt::print("{} ({} images, {:.1f} s at {:.0f} per second)\n", recheck_sentence(result), checked.images,
-             checked.images / k_images_a_second, k_images_a_second);
+  fmt::print("{} ({} images, {:.1f} s at {:.0f} per second)\n", wizard::recheck_sentence(result),
+             checked.images, checked.images / k_images_a_second, k_images_a_second);
 }
 
-Result<CheckedRig> check(const RecheckCommand& command) {
+Result<wizard::CheckedRig> check(const RecheckCommand& command) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   LIMN_TRY(const fs::path folder, captured(command));
-  LIMN_TRY(CheckedRig checked, recheck_rig(rig, folder, command.still, command.out));
+  LIMN_TRY(wizard::CheckedRig checked, wizard::recheck_rig(rig, folder, command.still, command.out));
   if (checked.rechecked.result.verdict != calib::RigVerdict::unexplained)
     LIMN_TRY_STATUS(write_rig(checked.rechecked.result, command));
   return checked;
@@ -121,19 +121,19 @@ Result<CheckedRig> check(const RecheckCommand& command) {
 
 }  // namespace
 
-Result<Rechecked> rechecked(const RecheckCommand& command) {
-  LIMN_TRY(CheckedRig checked, check(command));
-  LIMN_TRY_STATUS(check_explained(checked.rechecked.result));
+Result<wizard::Rechecked> rechecked(const RecheckCommand& command) {
+  LIMN_TRY(wizard::CheckedRig checked, check(command));
+  LIMN_TRY_STATUS(wizard::check_explained(checked.rechecked.result));
   return checked.rechecked;
 }
 
 Status run_recheck(const RecheckCommand& command) {
-  LIMN_TRY(const CheckedRig checked, check(command));
+  LIMN_TRY(const wizard::CheckedRig checked, check(command));
   if (command.json)
     fmt::print("{}", checked.json);
   else
     print_table(checked.rechecked);
-  LIMN_TRY_STATUS(check_explained(checked.rechecked.result));
+  LIMN_TRY_STATUS(wizard::check_explained(checked.rechecked.result));
   if (!command.json) fmt::print("rig in {}\n", command.out.string());
   return {};
 }

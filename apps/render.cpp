@@ -72,7 +72,7 @@ Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig
   std::size_t marker_count = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].empty()) continue;
-    tracker::Detector detector(families, {.encoding = encoding_of(rig, rig.cameras[i])});
+    tracker::Detector detector(families, {.encoding = tracker::encoding_of(rig, rig.cameras[i])});
     detections[i] = detector.detect(to_grey(frames[i]), &rig.cameras[i].lens);
     marker_count += detections[i].size();
     views.push_back({&rig.cameras[i], detections[i]});

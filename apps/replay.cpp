@@ -58,18 +58,22 @@ std::size_t known_moments(const Json& event) {
 
 // A recording as the clock and source of the frame loop. A frame of the loop ends with an image, or earlier
 // if an edit happened after more camera frames had been perceived, because those must be perceived first.
-class Recording final : public FrameClock, public FrameSource {
+class Recording final : public session::FrameClock, public session::FrameSource {
  public:
-  Recording(const ReplayOptions& options, const Events& events, Perception* perception, Session* session)
+  Recording(const ReplayOptions& options,
+            const Events& events,
+            session::Perception* perception,
+            session::Session* session)
       : options_(options), events_(events.all), perception_(perception), session_(session) {}
 
   Stamp now() const override { return now_; }
 
-  Result<std::optional<FrameTimes>> next_frame() override try {
+  Result<std::optional<session::FrameTimes>> next_frame() override try {
     const Json* event = next();
-    if (!event || !event->contains("paint") || !is_perceived(*event)) return std::optional<FrameTimes>();
+    if (!event || !event->contains("paint") || !is_perceived(*event))
+      return std::optional<session::FrameTimes>();
     const Json& paint = event->at("paint");
-    const FrameTimes times{stamp_of(paint.at("painted_at_ns")), stamp_of(paint.at("shown_at_ns"))};
+    const session::FrameTimes times{stamp_of(paint.at("painted_at_ns")), stamp_of(paint.at("shown_at_ns"))};
     painted_ = {paint, event->at("pictures")};
     pass();
     wait_for(times.shown_at);
@@ -90,9 +94,9 @@ class Recording final : public FrameClock, public FrameSource {
 
   // Perceives the camera frames that the next event depends on. In the session another thread perceived them,
   // perhaps ahead of the event.
-  Result<Perceived> perceive() override try {
+  Result<session::Perceived> perceive() override try {
     while (next() && next()->contains("watch")) queue_frames();
-    Perceived out;
+    session::Perceived out;
     if (!next() || is_perceived(*next())) return out;
     asked_ = known_moments(*next());
     while (moments_ < asked_ && !unwatched_.empty()) {
@@ -107,7 +111,7 @@ class Recording final : public FrameClock, public FrameSource {
     return damage(problem);
   }
 
-  Status edit(Session*) override try {
+  Status edit(session::Session*) override try {
     for (; next() && !next()->contains("paint") && is_perceived(*next()); pass()) {
       const Status done = apply(*next());
       if (!done) return done;
@@ -141,7 +145,7 @@ class Recording final : public FrameClock, public FrameSource {
           !session_->setup().rig.find(camera))
         return error("{}: expected a frame of one of the rig's cameras inside the folder, found {} of {}.",
                      options_.session.string(), file, camera);
-      LIMN_TRY(Frame frame, load_frame(options_.session / file));
+      LIMN_TRY(Frame frame, session::load_frame(options_.session / file));
       frame.camera = camera;
       frame.captured_at = stamp_of(item.at("captured_at_ns"));
       frames.push_back(std::move(frame));
@@ -171,8 +175,8 @@ class Recording final : public FrameClock, public FrameSource {
     LIMN_TRY(const fs::path path, inside(folder));
     LIMN_TRY(Rig rig, load_rig(path));
     LIMN_TRY_STATUS(session_->replace_rig(std::move(rig), session_->percepts().captured_at));
-    const SessionSetup& setup = session_->setup();
-    LIMN_TRY(*perception_, Perception::create(setup.scene, setup.rig, setup.watch));
+    const session::SessionSetup& setup = session_->setup();
+    LIMN_TRY(*perception_, session::Perception::create(setup.scene, setup.rig, setup.watch));
     return {};
   }
 
@@ -213,8 +217,8 @@ class Recording final : public FrameClock, public FrameSource {
 
   const ReplayOptions& options_;
   const std::vector<Json>& events_;
-  Perception* perception_;
-  Session* session_;
+  session::Perception* perception_;
+  session::Session* session_;
   std::size_t at_ = 0;                   // the next event
   std::deque<const Json*> unwatched_;    // moments whose frames are not perceived yet
   std::size_t moments_ = 0, asked_ = 0;  // moments perceived; moments needed by the next event
@@ -224,16 +228,18 @@ class Recording final : public FrameClock, public FrameSource {
 };
 
 // Compares what is painted with the recording, and can show a screen in a window.
-class Comparison final : public FrameSink {
+class Comparison final : public session::FrameSink {
  public:
-  Comparison(const Recording* recording, const Session* session, std::optional<device::Window> window)
+  Comparison(const Recording* recording,
+             const session::Session* session,
+             std::optional<device::Window> window)
       : recording_(recording), session_(session), window_(std::move(window)) {}
 
-  Status show(const ComposedFrame& painted, const std::vector<cv::Mat>&) override {
+  Status show(const session::ComposedFrame& painted, const std::vector<cv::Mat>&) override {
     ++images_;
     const double at_s = seconds_between(Stamp{}, painted.shown_at);
-    if (pose_log(painted) != recording_->painted().poses && ++other_poses_ == 1) first_pose_ = at_s;
-    const std::string print = fmt::format("{:016x}", fingerprint(painted.projectors));
+    if (session::pose_log(painted) != recording_->painted().poses && ++other_poses_ == 1) first_pose_ = at_s;
+    const std::string print = fmt::format("{:016x}", session::fingerprint(painted.projectors));
     if (print != recording_->painted().images && ++other_images_ == 1) first_image_ = at_s;
     return {};
   }
@@ -264,7 +270,7 @@ class Comparison final : public FrameSink {
 
  private:
   const Recording* recording_;
-  const Session* session_;
+  const session::Session* session_;
   std::optional<device::Window> window_;
   std::atomic<bool> is_closed_ = false;
   std::size_t images_ = 0, other_poses_ = 0, other_images_ = 0;
@@ -275,20 +281,20 @@ class Comparison final : public FrameSink {
 
 Status run_replay(const ReplayOptions& options) {
   if (!(options.speed >= 0)) return usage_error("--speed: expected 0 or more, found {}.", options.speed);
-  LIMN_TRY(SessionSetup setup, load_setup(options.session));
+  LIMN_TRY(session::SessionSetup setup, session::load_setup(options.session));
   LIMN_TRY(const Events events, load_events(options.session / "events.jsonl"));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
-  LIMN_TRY(SessionOutput output, SessionOutput::open(options.out, {}, &setup));
-  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
-  LIMN_TRY(Session session, Session::create(setup, nullptr, nullptr, false));
+  LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, {}, &setup));
+  LIMN_TRY(session::Perception perception, session::Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(session::Session session, session::Session::create(setup, nullptr, nullptr, false));
   std::optional<device::Window> window;
   if (options.window) {
     LIMN_TRY(window, device::Window::open("Limn replay", 1280, 720));
   }
   Recording recording(options, events, &perception, &session);
   Comparison comparison(&recording, &session, std::move(window));
-  DeviceHealth no_devices;
-  FrameLoop loop({perception, session, output}, {recording, recording, comparison, no_devices});
+  session::DeviceHealth no_devices;
+  session::FrameLoop loop({perception, session, output}, {recording, recording, comparison, no_devices});
   std::optional<Progress> progress(std::in_place, "replay", static_cast<int>(events.all.size()));
   const Status played = loop.run(comparison.is_closed(), [&] { progress->step(recording.passed()); });
   progress.reset();

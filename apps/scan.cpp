@@ -47,15 +47,15 @@ Status run_scan(const ScanCommand& command) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   std::filesystem::path folder = command.captures;
   if (!command.plan.empty()) {
-    LIMN_TRY(const Plan plan, load_plan(command.plan));
-    LIMN_TRY(sim::World world, sim::load_world(plan.world, marker_image));
+    LIMN_TRY(const wizard::Plan plan, wizard::load_plan(command.plan));
+    LIMN_TRY(sim::World world, sim::load_world(plan.world, tracker::marker_image));
     sim::VirtualRig virtual_rig(std::move(world));
     folder = command.out / "captures";
     LIMN_TRY_STATUS(
-        capture_prototype(plan, {virtual_rig.world().world_from_prototype}, &virtual_rig, folder));
+        wizard::capture_prototype(plan, {virtual_rig.world().world_from_prototype}, &virtual_rig, folder));
   }
   LIMN_TRY(const calib::CaptureSet captures, calib::load_captures(folder));
-  LIMN_TRY(const calib::Scan scan, written_scan(captures, rig, options_of(command), command.out));
+  LIMN_TRY(const calib::Scan scan, wizard::written_scan(captures, rig, options_of(command), command.out));
   for (const std::string& warning : scan.warnings) log_warning("scan: {}", warning);
   if (command.json) {
     LIMN_TRY(const std::string json, read_file(command.out / "scan.json"));
@@ -63,7 +63,7 @@ Status run_scan(const ScanCommand& command) {
     return {};
   }
   fmt::print("{} points, standard deviation {:.3f} mm (median); mesh of {} triangles; in {}\n",
-             scan.points.positions.size(), stddev_mm(scan, 0.5), scan.mesh.triangles.size(),
+             scan.points.positions.size(), wizard::stddev_mm(scan, 0.5), scan.mesh.triangles.size(),
              command.out.string());
   return {};
 }

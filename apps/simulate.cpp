@@ -159,7 +159,7 @@ Status shoot_camera(const sim::World& world,
 }  // namespace
 
 Status run_simulate(const SimulateOptions& options) {
-  LIMN_TRY(sim::World world, sim::load_world(options.world, marker_image));
+  LIMN_TRY(sim::World world, sim::load_world(options.world, tracker::marker_image));
   LIMN_TRY(const std::vector<cv::Mat> shown, shown_images(options.show, world.rig));
   LIMN_TRY(const std::vector<std::string> variants, chosen_variants(options.variants, world));
   LIMN_TRY_STATUS(make_folder(options.out));

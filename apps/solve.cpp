@@ -44,8 +44,8 @@ void print_report(const calib::Report& report) {
 
 }  // namespace
 
-Status run_solve(const SolveCommandOptions& options, bool is_json) {
-  LIMN_TRY(const calib::Report report, solved(options));
+Status run_solve(const wizard::SolveCommandOptions& options, bool is_json) {
+  LIMN_TRY(const calib::Report report, wizard::solved(options));
   if (is_json) {
     fmt::print("{}", calib::report_json(report));
   } else {

@@ -6,6 +6,6 @@
 namespace limn::apps {
 
 /// `limn solve`: calls solved() and prints a table. `is_json`: prints report.json instead.
-Status run_solve(const SolveCommandOptions& options, bool is_json = false);
+Status run_solve(const wizard::SolveCommandOptions& options, bool is_json = false);
 
 }  // namespace limn::apps

@@ -10,7 +10,7 @@
 #include "design/sight_lines.h"
 #include "design/volume_points.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 using Eigen::Vector3d;
@@ -133,4 +133,4 @@ std::vector<std::string> design_advice(const PredictedAccuracy& predicted_accura
   return advice;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

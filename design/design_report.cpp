@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 nlohmann::ordered_json number(double value) {
@@ -94,4 +94,4 @@ std::string design_table(const PredictedAccuracy& predicted_accuracy, const Desc
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -4,7 +4,7 @@
 
 #include "design/rig_design.h"
 
-namespace limn::apps {
+namespace limn::design {
 
 /// The text that `limn plan` prints.
 std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described);
@@ -12,4 +12,4 @@ std::string design_table(const PredictedAccuracy& predicted_accuracy, const Desc
 /// The same as JSON (plan.json), without a newline at its end.
 std::string design_json(const PredictedAccuracy& predicted_accuracy);
 
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -10,7 +10,7 @@
 #include "core/svg.h"
 #include "design/design_report.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 using Eigen::Vector2d;
@@ -146,4 +146,4 @@ std::string plan_page(const DescribedRig& described, const PredictedAccuracy& pr
   return html_page("Limn: rig design", HtmlColours::of_system, k_plan_style, html);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -5,7 +5,7 @@
 #include "core/config.h"
 #include "design/sight_lines.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 using Eigen::Vector3d;
@@ -116,4 +116,4 @@ Result<DescribedRig> load_described(const std::filesystem::path& path) {
   return described;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

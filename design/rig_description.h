@@ -8,7 +8,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 
-namespace limn::apps {
+namespace limn::design {
 
 /// A rig before it is bought, as a limn.described/1 file describes it (config/README.md).
 struct DescribedRig {
@@ -28,4 +28,4 @@ struct DescribedRig {
 /// Reads a limn.described/1 file. Errors name the file and the key.
 Result<DescribedRig> load_described(const std::filesystem::path& path);
 
-}  // namespace limn::apps
+}  // namespace limn::design

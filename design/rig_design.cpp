@@ -17,7 +17,7 @@
 #include "design/volume_points.h"
 #include "tracker/pose_fit.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 using Eigen::Vector2d;
@@ -163,4 +163,4 @@ Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described) {
   return predicted_accuracy;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

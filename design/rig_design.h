@@ -6,7 +6,7 @@
 #include "core/result.h"
 #include "design/rig_description.h"
 
-namespace limn::apps {
+namespace limn::design {
 
 /// An imager, and how it sees or lights the prototype's lit side in the middle of the volume.
 struct PredictedImager {
@@ -52,4 +52,4 @@ struct PredictedAccuracy {
 /// same numbers. Error: the solve's error.
 Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described);
 
-}  // namespace limn::apps
+}  // namespace limn::design

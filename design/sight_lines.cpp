@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-namespace limn::apps {
+namespace limn::design {
 
 using Eigen::Vector3d;
 
@@ -19,4 +19,4 @@ bool reaches(const Imager& imager, const Vector3d& p_world) {
   return px && imager.contains(*px);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -6,7 +6,7 @@
 #include "core/imager.h"
 #include "core/pose.h"
 
-namespace limn::apps {
+namespace limn::design {
 
 constexpr double k_degree = std::numbers::pi / 180;
 
@@ -20,4 +20,4 @@ Pose upright_looking_at(const Eigen::Vector3d& p_eye, const Eigen::Vector3d& p_t
 /// Whether a point lies in the imager's image.
 bool reaches(const Imager& imager, const Eigen::Vector3d& p_world);
 
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -11,7 +11,7 @@
 #include "calib/measurement_model.h"
 #include "design/sight_lines.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 using Eigen::Vector2d;
@@ -123,4 +123,4 @@ calib::Observations simulated_observations(const DescribedRig& described) {
   return seen;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

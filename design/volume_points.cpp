@@ -1,6 +1,6 @@
 #include "design/volume_points.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 constexpr int k_grid = 9;  // points along each side of the volume
@@ -17,4 +17,4 @@ std::vector<Eigen::Vector3d> volume_points(const DescribedRig& described) {
   return points;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

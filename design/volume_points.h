@@ -6,7 +6,7 @@
 
 #include "design/rig_description.h"
 
-namespace limn::apps {
+namespace limn::design {
 
 /// A grid of points all over the working volume, world frame.
 std::vector<Eigen::Vector3d> volume_points(const DescribedRig& described);
@@ -18,4 +18,4 @@ double share_reached(const std::vector<Eigen::Vector3d>& points, const Reached& 
          static_cast<double>(points.size());
 }
 
-}  // namespace limn::apps
+}  // namespace limn::design

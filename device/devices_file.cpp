@@ -6,7 +6,7 @@
 #include "core/config.h"
 #include "core/names.h"
 
-namespace limn::apps {
+namespace limn::device {
 namespace {
 
 std::optional<double> positive_of(const ConfigNode& node, const std::string& key) {
@@ -154,4 +154,4 @@ Result<Devices> matched(const Devices& devices, const Rig& rig) {
   return fitted;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::device

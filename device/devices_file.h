@@ -9,7 +9,7 @@
 #include "device/open_camera.h"
 #include "device/open_display.h"
 
-namespace limn::apps {
+namespace limn::device {
 
 /// The cameras, displays and keys of an installation (limn.devices/1).
 struct Devices {
@@ -29,4 +29,4 @@ Result<Devices> load_devices(const std::filesystem::path& path);
 /// change.
 Result<Devices> matched(const Devices& devices, const Rig& rig);
 
-}  // namespace limn::apps
+}  // namespace limn::device

@@ -6,7 +6,7 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
-namespace limn::apps {
+namespace limn::device {
 namespace {
 
 struct Colour {
@@ -50,4 +50,4 @@ cv::Mat output_sign(cv::Size size, int number, const std::string& name) {
   return image;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::device

@@ -9,7 +9,7 @@
 #include "exchange/mpcdi_exporter.h"
 #include "exchange/warp_exporter.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 const std::vector<Exporter>& exporters() {
   static const std::vector<Exporter> all = {mpcdi_exporter(), warp_exporter(), look_exporter()};
@@ -60,4 +60,4 @@ Result<ExportJob> load_export_job(const ExportOptions& options) {
   return job;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -13,7 +13,7 @@
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// The file format of exported points; its names are also the files' extensions.
 enum class WarpFormat { pfm, exr };
@@ -64,4 +64,4 @@ Status check_export(const ExportOptions& options);
 /// the exporters asked for need.
 Result<ExportJob> load_export_job(const ExportOptions& options);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -9,7 +9,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 std::string exr_bytes(const cv::Mat& image, const std::string& comment) {
   LIMN_CHECK(image.type() == CV_32FC3);
@@ -32,4 +32,4 @@ std::string exr_bytes(const cv::Mat& image, const std::string& comment) {
   return stream.str();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -8,7 +8,7 @@
 #include "core/image_io.h"
 #include "projector/renderer.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 // Draws every placed slot's variants, one at a time, as the viewer sees them over black.
@@ -42,4 +42,4 @@ Exporter look_exporter() {
           .write = write_looks};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 using Eigen::Matrix3d;
@@ -112,4 +112,4 @@ cv::Mat places_in_frustum(const MpcdiFrustum& frustum, const Imager& imager) {
   return places;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -9,7 +9,7 @@
 #include "core/enum_names.h"
 #include "core/imager.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// What a file's warp maps are.
 enum class MpcdiProfile {
@@ -93,4 +93,4 @@ std::optional<Imager> imager_of(const MpcdiRegion& region);
 /// format of MpcdiRegion::distortion.
 cv::Mat places_in_frustum(const MpcdiFrustum& frustum, const Imager& imager);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

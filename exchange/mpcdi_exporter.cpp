@@ -15,7 +15,7 @@
 #include "core/photometric_response.h"
 #include "exchange/mpcdi_writer.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 cv::Mat as_levels(const cv::Mat& values, int bits) {
@@ -142,4 +142,4 @@ Exporter mpcdi_exporter() {
               }};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

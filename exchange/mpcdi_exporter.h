@@ -2,9 +2,9 @@
 
 #include "exchange/exporter.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// Writes an archive of MPCDI 2.0 with every projector's points, shares and pose.
 Exporter mpcdi_exporter();
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

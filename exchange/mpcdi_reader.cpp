@@ -13,7 +13,7 @@
 #include "exchange/pfm.h"
 #include "exchange/zip.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 namespace fs = std::filesystem;
@@ -475,4 +475,4 @@ Status Reader::check_regions() {
 
 Result<Mpcdi> read_mpcdi(const fs::path& path) { return Reader(path).read(); }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

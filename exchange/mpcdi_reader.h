@@ -5,7 +5,7 @@
 #include "core/result.h"
 #include "exchange/mpcdi.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// Reads an MPCDI archive of version 1 or 2, or its XML alone (as Christie's Mystique writes it:
 /// `*.mpcdi.xml`, poses without maps). Lengths become metres. Nothing is unpacked to disk. Errors name the
@@ -13,4 +13,4 @@ namespace limn::apps {
 /// projector's.
 Result<Mpcdi> read_mpcdi(const std::filesystem::path& path);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

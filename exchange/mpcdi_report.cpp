@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 using nlohmann::ordered_json;
@@ -70,4 +70,4 @@ nlohmann::ordered_json mpcdi_report(const Mpcdi& mpcdi) {
   return json;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

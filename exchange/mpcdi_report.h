@@ -4,9 +4,9 @@
 
 #include "exchange/mpcdi.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// A report of what an MPCDI file holds (limn.import/1).
 nlohmann::ordered_json mpcdi_report(const Mpcdi& mpcdi);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

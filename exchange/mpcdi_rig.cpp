@@ -4,7 +4,7 @@
 
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 // A device name, also used as file name, that the rig does not have yet.
@@ -36,4 +36,4 @@ Result<Rig> mpcdi_rig(const Mpcdi& mpcdi, const std::string& file) {
       file);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -6,10 +6,10 @@
 #include "core/rig.h"
 #include "exchange/mpcdi.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// The projectors that are described by a pinhole or by one of Limn's lenses; their world frame is the
 /// coordinate frame of `file`. Error: there is none.
 Result<Rig> mpcdi_rig(const Mpcdi& mpcdi, const std::string& file);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

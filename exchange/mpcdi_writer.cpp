@@ -8,7 +8,7 @@
 #include "exchange/pfm.h"
 #include "exchange/zip.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 void add(pugi::xml_node parent, const char* name, const std::string& text) {
@@ -144,4 +144,4 @@ Status write_mpcdi(const std::filesystem::path& path, const Mpcdi& mpcdi) {
   return write_file(path, bytes);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

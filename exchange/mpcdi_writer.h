@@ -5,10 +5,10 @@
 #include "core/result.h"
 #include "exchange/mpcdi.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// Writes an archive of MPCDI 2.0: mpcdi.xml, and the maps as PFM and PNG. The file at `path` is replaced
 /// only when the new one is complete.
 Status write_mpcdi(const std::filesystem::path& path, const Mpcdi& mpcdi);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string_view>
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
@@ -73,4 +73,4 @@ Result<cv::Mat> read_pfm(const std::string& bytes, const std::string& where, std
   return image;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// The bytes of a PFM (portable float map) for a CV_32FC3 image: three floats for each pixel, little-endian,
 /// bottom row first.
@@ -17,4 +17,4 @@ std::string pfm_bytes(const cv::Mat& image);
 /// `most_pixels` pixels. `where` names the file in messages.
 Result<cv::Mat> read_pfm(const std::string& bytes, const std::string& where, std::int64_t most_pixels);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

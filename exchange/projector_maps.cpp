@@ -4,7 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-namespace limn::apps {
+namespace limn::exchange {
 
 ProjectorMaps projector_maps(projector::Renderer* renderer,
                              std::size_t index,
@@ -21,4 +21,4 @@ ProjectorMaps projector_maps(projector::Renderer* renderer,
   return maps;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

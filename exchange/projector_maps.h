@@ -6,7 +6,7 @@
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// The points that one projector reaches, and how its light is blended.
 struct ProjectorMaps {
@@ -20,4 +20,4 @@ ProjectorMaps projector_maps(projector::Renderer* renderer,
                              std::size_t index,
                              const scene::PosedScene& posed);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

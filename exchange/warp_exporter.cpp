@@ -9,7 +9,7 @@
 #include "exchange/exr.h"
 #include "exchange/pfm.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 Status write_warps(const ExportJob& job, const ExportOptions& options) {
@@ -38,4 +38,4 @@ Exporter warp_exporter() {
           .write = write_warps};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 std::string text_of(zip_error_t* problem) {
@@ -122,4 +122,4 @@ Result<std::string> zipped(const std::vector<ZipFile>& files) {
   return bytes;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

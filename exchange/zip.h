@@ -8,7 +8,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// A zip archive in memory.
 class ZipArchive {
@@ -37,4 +37,4 @@ struct ZipFile {
 /// The bytes of an archive with these files.
 Result<std::string> zipped(const std::vector<ZipFile>& files);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

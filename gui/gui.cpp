@@ -13,7 +13,7 @@
 #include "core/result.h"
 #include "core/screen_encoding.h"
 
-namespace limn::apps {
+namespace limn::gui {
 namespace {
 
 constexpr float k_text_px = 19, k_heading_px = 22;
@@ -225,4 +225,4 @@ void label_at(ImVec2 corner, ImU32 colour, const std::string& text) {
   draw.AddText(corner, colour, text.c_str());
 }
 
-}  // namespace limn::apps
+}  // namespace limn::gui

@@ -11,7 +11,7 @@
 
 #include "device/window.h"
 
-namespace limn::apps {
+namespace limn::gui {
 
 /// Colours with fixed meanings, on a dark background.
 namespace colour {
@@ -84,4 +84,4 @@ bool toggle(const std::string& label, bool is_on, ImU32 lit, ImVec2 size);
 /// Text drawn over an image, on a background of its own.
 void label_at(ImVec2 corner, ImU32 colour, const std::string& text);
 
-}  // namespace limn::apps
+}  // namespace limn::gui

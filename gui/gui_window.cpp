@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace limn::apps {
+namespace limn::gui {
 namespace {
 
 constexpr double k_period_s = 1 / 30.0, k_touched_s = 1 / 60.0;  // between images
@@ -77,4 +77,4 @@ void GuiWindow::draw(const std::function<void(Gui&)>& widgets) {
   cost_s_ = std::chrono::duration<double>(drawn_at_ - begun).count();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::gui

@@ -11,7 +11,7 @@
 #include "device/window.h"
 #include "gui/gui.h"
 
-namespace limn::apps {
+namespace limn::gui {
 
 /// A window of the desktop that Dear ImGui draws in. It must be used by the main thread. It does not change
 /// the current GL context and never waits for the monitor.
@@ -48,4 +48,4 @@ class GuiWindow {
   double cost_s_ = 0;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::gui

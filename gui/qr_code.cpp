@@ -5,7 +5,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 
-namespace limn::apps {
+namespace limn::gui {
 namespace {
 
 constexpr int k_margin = 4;
@@ -27,4 +27,4 @@ cv::Mat qr_code(const std::string& text) {
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::gui

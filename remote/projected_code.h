@@ -33,10 +33,10 @@ class ProjectedCode {
 
   /// The code, on the largest flat and free piece of the prototype, or in the middle of the image if there is
   /// none. Empty during a blackout and when the time is over.
-  std::vector<apps::Overlay> overlays(apps::Session* session);
+  std::vector<session::Overlay> overlays(session::Session* session);
 
  private:
-  bool start_if_due(apps::Session* session, std::size_t projector);
+  bool start_if_due(session::Session* session, std::size_t projector);
   void end();
 
   std::chrono::milliseconds duration_{};
@@ -46,7 +46,7 @@ class ProjectedCode {
   std::optional<Clock::time_point> requested_at_, searched_at_,
       shown_until_;  // nullopt before the first frame
   cv::Mat sign_;
-  std::optional<apps::OverlayPlace> place_;  // its place on the prototype
+  std::optional<session::OverlayPlace> place_;  // its place on the prototype
 };
 
 }  // namespace limn::remote

@@ -84,7 +84,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   const auto named = [](const Error& problem) {
     return Error{fmt::format("--serve: {}", problem.message), problem.wrong_usage};
   };
-  const auto place = apps::net_place(options.at, "127.0.0.1", true);
+  const auto place = session::net_place(options.at, "127.0.0.1", true);
   if (!place) return named(place.error());
   auto files =
       StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);
@@ -140,7 +140,7 @@ std::optional<EditRequest> Server::next_edit_request() {
   return request;
 }
 
-void Server::apply_edits(apps::Session* session, Stamp at) {
+void Server::apply_edits(session::Session* session, Stamp at) {
   const auto begun = Clock::now();
   std::map<std::string, std::optional<Eigen::Vector3d>> viewpoints;
   {
@@ -158,12 +158,12 @@ void Server::apply_edits(apps::Session* session, Stamp at) {
   }
 }
 
-void Server::apply_edits(const apps::SessionMoment& moment) {
+void Server::apply_edits(const session::SessionMoment& moment) {
   apply_edits(&moment.session, moment.at);
   publish_state(moment.session, moment.telemetry, moment.health, moment.at);
 }
 
-std::vector<apps::Overlay> Server::overlays(apps::Session* session) { return code_.overlays(session); }
+std::vector<session::Overlay> Server::overlays(session::Session* session) { return code_.overlays(session); }
 
 void Server::show_code(const std::string& projector, Role role) {
   const std::string& pin = invitation_.pins[static_cast<std::size_t>(role)];
@@ -174,9 +174,9 @@ void Server::show_code(const std::string& projector, Role role) {
   log_info("live: {} shows the code of the remote for {}", projector, name_of(role));
 }
 
-void Server::publish_state(const apps::Session& session,
-                           const apps::Telemetry& telemetry,
-                           const apps::DeviceHealth& health,
+void Server::publish_state(const session::Session& session,
+                           const session::Telemetry& telemetry,
+                           const session::DeviceHealth& health,
                            Stamp at) {
   if (!begun_at_) begun_at_ = at;
   if (update_providers_) update_providers_(session);

@@ -38,7 +38,7 @@ struct ServeOptions {
 /// The remote of a session (docs/remote.md): the network, the API and the projected code. All public
 /// functions belong to the session's thread and never wait, but for open() and stop(); everything else
 /// happens on threads of the server's own.
-class Server : public apps::SessionClient, public apps::RemoteLink {
+class Server : public session::SessionClient, public session::RemoteLink {
  public:
   /// Starts the server. Logs its address and the PINs. Errors name the option. `providers` may be empty.
   static Result<std::unique_ptr<Server>> open(const ServeOptions& options, ImageProviders providers);
@@ -47,19 +47,19 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
   /// Hands the viewpoints of guests' tablets to the session, and then their edits: at most
   /// k_max_edits_at_once, and for at most 5 ms; the others wait for the next call. Guests are told of edits
   /// that cannot be done.
-  void apply_edits(apps::Session* session, Stamp at);
+  void apply_edits(session::Session* session, Stamp at);
   /// Publishes the session's state: at once after an edit, otherwise twenty times a second, and once a second
   /// while nobody is paired.
-  void publish_state(const apps::Session& session,
-                     const apps::Telemetry& telemetry,
-                     const apps::DeviceHealth& health,
+  void publish_state(const session::Session& session,
+                     const session::Telemetry& telemetry,
+                     const session::DeviceHealth& health,
                      Stamp at);
 
   /// Both apply edits and publish the state, so that an edit that comes while a frame is made need not wait
   /// for the next one.
-  void apply_edits(const apps::SessionMoment& moment) override;
-  void publish_state(const apps::SessionMoment& moment) override { apply_edits(moment); }
-  std::vector<apps::Overlay> overlays(apps::Session* session) override;
+  void apply_edits(const session::SessionMoment& moment) override;
+  void publish_state(const session::SessionMoment& moment) override { apply_edits(moment); }
+  std::vector<session::Overlay> overlays(session::Session* session) override;
 
   /// Has a projector show the code that pairs for a role, from its next image on and for
   /// ServeOptions::code_duration. Any other projector stops. Guests of lesser roles see no images of the room
@@ -70,7 +70,7 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
   /// Closes all connections, destroys the image providers and ends the threads.
   void stop();
 
-  const apps::Invitation& invitation() const override { return invitation_; }
+  const session::Invitation& invitation() const override { return invitation_; }
   int port() const { return network_->port(); }
 
   static constexpr std::size_t k_max_edits_at_once = 64;
@@ -83,7 +83,7 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
   std::optional<EditRequest> next_edit_request();
   void hand_over_news(SessionNews news);
 
-  apps::Invitation invitation_;
+  session::Invitation invitation_;
   WorkerThread worker_;
   std::unique_ptr<RequestHandler> handler_;
   std::unique_ptr<Network> network_;
@@ -97,7 +97,7 @@ class Server : public apps::SessionClient, public apps::RemoteLink {
 
   // Used by the session's thread alone.
   std::vector<EditResult> edit_results_;
-  std::function<void(const apps::Session&)> update_providers_;
+  std::function<void(const session::Session&)> update_providers_;
   std::shared_ptr<const scene::Scene> scene_;
   int scenes_ = 0;
   ProjectedCode code_;

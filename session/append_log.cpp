@@ -4,7 +4,7 @@
 
 #include "core/file.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_every_s = 1;
@@ -64,4 +64,4 @@ std::optional<std::string> AppendLog::news() {
   return why_ + " Its lines are kept and written later.";
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -6,7 +6,7 @@
 #include "session/frame_gate.h"
 #include "session/latest.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr auto k_retry = std::chrono::milliseconds(100);
@@ -76,4 +76,4 @@ void CameraThreads::grab(device::CameraSource* camera, std::size_t number, Share
       fmt::format("{}: this is a bug in Limn, please report it: {}", camera->name(), bug.what()));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -13,7 +13,7 @@
 #include "device/camera_source.h"
 #include "session/device_health.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Frames by the name of their camera.
 using Frames = std::map<std::string, Frame>;
@@ -51,4 +51,4 @@ class CameraThreads {
   std::vector<Running> running_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -9,7 +9,7 @@
 #include "core/image_io.h"
 #include "core/names.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr int k_width = 960;  // largest width of an image, pixels
@@ -41,4 +41,4 @@ Status write_contact_sheet(std::span<const scene::Look> looks,
   return write_file(page, html_page("Limn: looks", HtmlColours::dark, k_sheet_style, html + "</div>\n"));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

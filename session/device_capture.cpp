@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Wait for a frame before is_ended_ is checked again.
@@ -30,10 +30,10 @@ DeviceCapture::DeviceCapture(SessionDevices* devices,
       projector_names_(device_names(rig.projectors)),
       is_ended_(is_ended) {}
 
-WizardBackend DeviceCapture::backend(ImageWriter* writer) {
+wizard::WizardBackend DeviceCapture::backend(ImageWriter* writer) {
   grabbed_.clear();
-  latency_s_.assign(devices_->projectors.size(), FlashOptions().limit_s);
-  WizardBackend backend;
+  latency_s_.assign(devices_->projectors.size(), wizard::FlashOptions().limit_s);
+  wizard::WizardBackend backend;
   backend.capture.show = [this](int projector, const cv::Mat& image) {
     return show_pattern(static_cast<std::size_t>(projector), image);
   };
@@ -95,4 +95,4 @@ Result<cv::Mat> DeviceCapture::grab(const std::string& camera) {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -11,7 +11,7 @@
 #include "session/perception_thread.h"
 #include "session/recalibration_stage.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Gives a live recalibration access to the cameras and displays of a session on devices. The session shows
 /// frames again while the result is computed.
@@ -24,7 +24,7 @@ class DeviceCapture final : public CaptureDevices {
                 const Rig& rig,
                 const std::atomic<bool>& is_ended);
 
-  WizardBackend backend(ImageWriter* writer) override;
+  wizard::WizardBackend backend(ImageWriter* writer) override;
   void pause_perception(Session* session) override;
   void resume_perception() override { perception_->start(); }
   bool waits_for_result() const override { return false; }
@@ -48,4 +48,4 @@ class DeviceCapture final : public CaptureDevices {
   Stamp on_surface_at_;            // when the light of the last pattern is on the surface
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace limn::apps {
+namespace limn::session {
 
 std::size_t DeviceHealth::add(DeviceState device) {
   devices_.push_back(std::move(device));
@@ -43,4 +43,4 @@ std::vector<std::string> DeviceHealth::news() {
   return std::exchange(news_, {});
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

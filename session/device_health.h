@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The state of one device of a session.
 struct DeviceState {
@@ -38,4 +38,4 @@ class DeviceHealth {
   std::vector<std::string> news_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "session/perception_thread.h"
 #include "session/scene_files_client.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Wait for new percepts; after it a frame is made without them.
@@ -177,4 +177,4 @@ Status play_on_devices(SessionDevices* devices,
   return loop.run(is_ended);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "session/frame_loop.h"
 #include "session/keys.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The opened devices of a session. The session takes ownership of the cameras. A camera or display that
 /// could not be opened is null; the session runs without it.
@@ -40,4 +40,4 @@ Status play_on_devices(SessionDevices* devices,
 /// Error: no camera works, or no projector works.
 Status check_devices(const SessionDevices& devices);
 
-}  // namespace limn::apps
+}  // namespace limn::session

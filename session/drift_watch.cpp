@@ -5,7 +5,7 @@
 
 #include "session/stillness.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_cells_a_second = 60;  // cells that are compared per second
@@ -151,4 +151,4 @@ void DriftWatch::settle(std::optional<Drift> found, Stamp at) {
   differs_since_.reset();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -11,7 +11,7 @@
 #include "session/perception.h"
 #include "session/projection_history.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// A device that is no longer at its calibrated pose.
 struct Drift {
@@ -73,4 +73,4 @@ class DriftWatch {
   std::optional<Stamp> differs_since_;  // since when the findings differ from drift_
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // In marker sides. Ring and word are well away from the marker's paper, so that their light does not hide the
@@ -88,4 +88,4 @@ void draw_word(const Imager& projector,
   add(light, image);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

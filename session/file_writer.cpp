@@ -1,6 +1,6 @@
 #include "session/file_writer.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 FileWriter::FileWriter() : thread_([this] { run(); }) {}
 
@@ -51,4 +51,4 @@ void FileWriter::run() {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

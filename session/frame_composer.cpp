@@ -7,7 +7,7 @@
 #include "session/feedback.h"
 #include "session/stillness.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Display value of rings and words, as a share; brighter ones could hide markers from cameras.
@@ -225,4 +225,4 @@ cv::Mat FrameComposer::free_surface(std::size_t projector) {
   return points;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -22,7 +22,7 @@
 #include "session/shadow_watch.h"
 #include "session/viewpoint_selector.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The images that are shown at one moment, and what they are made of.
 struct ComposedFrame {
@@ -111,4 +111,4 @@ class FrameComposer {
   bool is_black_ = false;  // in a blackout, which has priority over a freeze
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

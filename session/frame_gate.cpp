@@ -4,7 +4,7 @@
 
 #include <utility>
 
-namespace limn::apps {
+namespace limn::session {
 
 FrameGate::FrameGate(std::string camera, cv::Size size, std::size_t number, DeviceHealth* health)
     : camera_(std::move(camera)), size_(size), number_(number), health_(health) {}
@@ -29,4 +29,4 @@ std::optional<Frame> FrameGate::taken(Result<Frame> sent, Stamp now) {
   return std::move(*sent);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

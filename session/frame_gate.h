@@ -9,7 +9,7 @@
 #include "session/device_health.h"
 #include "session/source_clock.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Checks the frames of one camera: accepts images of the size that the rig was calibrated with, and converts
 /// their stamps to the session's clock.
@@ -33,4 +33,4 @@ class FrameGate {
   SourceClock clock_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -1,6 +1,6 @@
 #include "session/frame_input.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Perception has already predicted with the filter to captured_at; its tracks are reused.
@@ -36,4 +36,4 @@ FrameInput frame_input(const scene::Scene& scene,
           scene::assign_tracks(scene, show_state, predicted_at_light(percepts, options, times))};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

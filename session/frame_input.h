@@ -12,7 +12,7 @@
 #include "tracker/marker_light.h"
 #include "tracker/predict.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 struct ComposeOptions {
   tracker::Prediction prediction = tracker::Prediction::filtered;
@@ -76,4 +76,4 @@ FrameInput frame_input(const scene::Scene& scene,
                        const scene::ShowState& show_state,
                        const FrameTimes& times);
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -3,7 +3,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 FrameLoop::FrameLoop(SessionParts parts, FrameSetting setting)
     : parts_(std::move(parts)),
@@ -119,4 +119,4 @@ void FrameLoop::note_devices() {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -17,7 +17,7 @@
 #include "session/session_client.h"
 #include "session/session_output.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The parts of every session: on devices, on a virtual rig, or in a replay.
 struct SessionParts {
@@ -103,4 +103,4 @@ class FrameLoop {
   RecalibrationStage recalibration_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -7,7 +7,7 @@
 #include "core/imager.h"
 #include "scene/posed_scene.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Draws grid lines on the prototype's surface at multiples of 10 mm of its own coordinates, stronger ones at
 /// multiples of 50 mm, for the two coordinates that run along the surface. Draws into an 8-bit BGR display
@@ -33,4 +33,4 @@ std::optional<cv::Vec3d> split_line(const Imager& imager,
                                     const Eigen::AlignedBox3d& prototype_box,
                                     double split_mm);
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -2,7 +2,7 @@
 
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 KeyClient::KeyClient(std::vector<device::KeySource>& sources,
                      const scene::Scene& scene,
@@ -32,4 +32,4 @@ void KeyClient::edit(int key, const Source& source, const SessionMoment& moment)
   log_warning("live: {}", done.message());
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -7,7 +7,7 @@
 #include "session/keys.h"
 #include "session/session_client.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Sends the key presses of clickers, pedals and keyboards to a session as edits.
 class KeyClient final : public SessionClient {
@@ -35,4 +35,4 @@ class KeyClient final : public SessionClient {
   std::vector<Source> sources_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::session {
 
 Keys::Keys(const scene::Scene& scene) {
   for (const scene::Slot& slot : scene.slots) slots_.push_back(slot.name);
@@ -23,4 +23,4 @@ std::optional<scene::Edit> Keys::edit_of(int key) {
   return std::nullopt;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -5,7 +5,7 @@
 #include "scene/actions.h"
 #include "scene/scene.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Maps keys of a keyboard, a presentation clicker or a pedal to edits; the actions name their keys
 /// (scene/actions.cpp). One slot is chosen at a time; tab chooses the next one.
@@ -23,4 +23,4 @@ class Keys {
   std::string none_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -3,7 +3,7 @@
 #include "core/user_folder.h"
 #include "core/worker_thread.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -25,7 +25,7 @@ std::string words_of(const calib::RigCheck& result, const fs::path& folder) {
       move.device, others, move.degrees, move.mm, folder.string());
 }
 
-Status mend(const Result<Rechecked>& checked,
+Status mend(const Result<wizard::Rechecked>& checked,
             const fs::path& folder,
             Stamp at,
             Perception* perception,
@@ -56,16 +56,17 @@ Result<fs::path> recalibration_folder(const fs::path& out) {
 
 LiveRecalibration::LiveRecalibration(const Rig& rig,
                                      fs::path folder,
-                                     const std::function<WizardBackend(ImageWriter*)>& backend)
-    : folder_(std::move(folder)), images_(recheck_images(rig)) {
-  result_ = std::async(std::launch::async,
-                       [this, rig, backend = through_errands(backend(&writer_))]() -> Result<Rechecked> {
-                         try {
-                           return rechecked_in_place(rig, backend, folder_, [this] { return !is_over_; });
-                         } catch (const std::exception& bug) {
-                           return error("this is a bug in Limn, please report it: {}", bug.what());
-                         }
-                       });
+                                     const std::function<wizard::WizardBackend(ImageWriter*)>& backend)
+    : folder_(std::move(folder)), images_(wizard::recheck_images(rig)) {
+  result_ =
+      std::async(std::launch::async,
+                 [this, rig, backend = through_errands(backend(&writer_))]() -> Result<wizard::Rechecked> {
+                   try {
+                     return wizard::rechecked_in_place(rig, backend, folder_, [this] { return !is_over_; });
+                   } catch (const std::exception& bug) {
+                     return error("this is a bug in Limn, please report it: {}", bug.what());
+                   }
+                 });
 }
 
 LiveRecalibration::~LiveRecalibration() {
@@ -74,8 +75,8 @@ LiveRecalibration::~LiveRecalibration() {
 }
 
 // The same functions, executed by serve(). After cancellation they return errors.
-WizardBackend LiveRecalibration::through_errands(WizardBackend backend) {
-  WizardBackend out;
+wizard::WizardBackend LiveRecalibration::through_errands(wizard::WizardBackend backend) {
+  wizard::WizardBackend out;
   out.capture.show = [this, show = backend.capture.show](int projector, const cv::Mat& image) {
     Status status = error("{}", k_ended);
     executor_.run([&] {
@@ -109,14 +110,14 @@ std::string LiveRecalibration::words() const {
   return is_capturing_ ? fmt::format("{} of {} patterns", shown_.load(), images_) : "computing";
 }
 
-std::optional<Result<Rechecked>> LiveRecalibration::take_result() {
+std::optional<Result<wizard::Rechecked>> LiveRecalibration::take_result() {
   if (!result_.valid() || result_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
     return std::nullopt;
   is_capturing_ = false;
   return result_.get();
 }
 
-void apply_recalibration(const Result<Rechecked>& checked,
+void apply_recalibration(const Result<wizard::Rechecked>& checked,
                          const fs::path& folder,
                          Stamp at,
                          Perception* perception,
@@ -128,4 +129,4 @@ void apply_recalibration(const Result<Rechecked>& checked,
   if (!mended) session->warn(at, "repair: " + mended.message() + " The session continues with the same rig.");
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

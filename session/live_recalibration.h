@@ -15,7 +15,7 @@
 #include "wizard/capture/main_thread_executor.h"
 #include "wizard/capture/rig_recheck.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// A new folder for a corrected rig of a session: in `out`, or in Limn's own folder if `out` is empty.
 Result<std::filesystem::path> recalibration_folder(const std::filesystem::path& out);
@@ -30,7 +30,7 @@ class LiveRecalibration {
   /// `backend` must set stage, written and use_latency; its images go to the writer that it is given.
   LiveRecalibration(const Rig& rig,
                     std::filesystem::path folder,
-                    const std::function<WizardBackend(ImageWriter*)>& backend);
+                    const std::function<wizard::WizardBackend(ImageWriter*)>& backend);
   /// Cancels the recheck; this takes a second at most.
   ~LiveRecalibration();
   LiveRecalibration(const LiveRecalibration&) = delete;
@@ -43,29 +43,29 @@ class LiveRecalibration {
   /// The progress in words: "12 of 44 patterns", "computing".
   std::string words() const;
   /// The result when it is finished, once; otherwise nullopt.
-  std::optional<Result<Rechecked>> take_result();
+  std::optional<Result<wizard::Rechecked>> take_result();
 
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
-  WizardBackend through_errands(WizardBackend backend);
+  wizard::WizardBackend through_errands(wizard::WizardBackend backend);
 
   std::filesystem::path folder_;
   int images_ = 0;
   std::atomic<int> shown_ = 0;
   std::atomic<bool> is_capturing_ = true, is_over_ = false;
-  MainThreadExecutor executor_;
+  wizard::MainThreadExecutor executor_;
   ImageWriter writer_;
-  std::future<Result<Rechecked>> result_;
+  std::future<Result<wizard::Rechecked>> result_;
 };
 
 /// If a device has moved, perception and session continue with the corrected rig, which is kept in `folder`
 /// for the next session. A failure is reported, and the session continues as before. Nothing else may use
 /// `perception` during the call.
-void apply_recalibration(const Result<Rechecked>& checked,
+void apply_recalibration(const Result<wizard::Rechecked>& checked,
                          const std::filesystem::path& folder,
                          Stamp at,
                          Perception* perception,
                          Session* session);
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -8,7 +8,7 @@
 #include "gui/qr_code.h"
 #include "tracker/camera_encoding.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr int k_width = 1600, k_height = 1000;
@@ -30,7 +30,7 @@ std::vector<OperatorView::Image> cameras_of(const Session& session) {
   const std::vector<Imager>& cameras = session.setup().rig.cameras;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     out.push_back({.name = cameras[i].name, .image = {}});
-    out.back().is_linear = encoding_of(session.setup().rig, cameras[i]) == tracker::Encoding::linear;
+    out.back().is_linear = tracker::encoding_of(session.setup().rig, cameras[i]) == tracker::Encoding::linear;
     if (i >= percepts.frames.size()) continue;
     out.back().image = percepts.frames[i].image;
     for (const tracker::Detection& detection : percepts.detections[i])
@@ -65,7 +65,7 @@ std::vector<OperatorView::Slot> slots_of(const Session& session, const std::stri
 OperatorView::Remote remote_view(const Invitation& invitation) {
   OperatorView::Remote out{invitation.url, invitation.fingerprint, invitation.authority_fingerprint, {}};
   for (const scene::Role role : {scene::Role::look, scene::Role::work, scene::Role::operate}) {
-    cv::Mat code = qr_code(invitation.url_for(role));
+    cv::Mat code = gui::qr_code(invitation.url_for(role));
     if (!code.empty()) cv::resize(code, code, {}, k_module_px, k_module_px, cv::INTER_NEAREST);
     out.entrances.push_back({role, invitation.pins[static_cast<std::size_t>(role)], std::move(code)});
   }
@@ -73,13 +73,13 @@ OperatorView::Remote remote_view(const Invitation& invitation) {
 }
 
 Result<OperatorConsole> OperatorConsole::open(const device::Desktop& desktop, const scene::Scene& scene) {
-  LIMN_TRY(GuiWindow window, GuiWindow::open(desktop, "Limn", k_width, k_height));
+  LIMN_TRY(gui::GuiWindow window, gui::GuiWindow::open(desktop, "Limn", k_width, k_height));
   return OperatorConsole(std::move(window), scene);
 }
 
 void OperatorConsole::invite(RemoteLink* remote) {
   remote_link_ = remote;
-  remote_ = apps::remote_view(remote->invitation());
+  remote_ = remote_view(remote->invitation());
 }
 
 void OperatorConsole::count_frame(const ShownFrame& frame) {
@@ -110,7 +110,7 @@ bool OperatorConsole::serve(
   if (!is_due()) return window_.is_wanted();
   const OperatorView view = view_of(*session, *telemetry, health, now);
   OperatorAsked asked;
-  window_.draw([&](Gui& gui) { asked = panel_.draw(gui, view); });
+  window_.draw([&](gui::Gui& gui) { asked = panel_.draw(gui, view); });
   for (const scene::Edit& wanted : asked.edits) edit(wanted, "operator");
   if (asked.code && remote_link_) remote_link_->show_code(asked.code->projector, asked.code->role);
   return !asked.ends && window_.is_wanted();
@@ -163,4 +163,4 @@ std::vector<OperatorView::Device> OperatorConsole::devices_of(const DeviceHealth
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -16,7 +16,7 @@
 #include "session/session_client.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The invitation as the window shows it, with QR codes for phones.
 OperatorView::Remote remote_view(const Invitation& invitation);
@@ -48,14 +48,15 @@ class OperatorConsole : public SessionClient {
   bool ends_session() const override { return ends_session_; }
 
  private:
-  OperatorConsole(GuiWindow window, const scene::Scene& scene) : window_(std::move(window)), keys_(scene) {}
+  OperatorConsole(gui::GuiWindow window, const scene::Scene& scene)
+      : window_(std::move(window)), keys_(scene) {}
   OperatorView view_of(const Session& session,
                        const Telemetry& telemetry,
                        const DeviceHealth& health,
                        Stamp now);
   std::vector<OperatorView::Device> devices_of(const DeviceHealth& health, Stamp now);
 
-  GuiWindow window_;
+  gui::GuiWindow window_;
   OperatorPanel panel_;
   Keys keys_;
   RemoteLink* remote_link_ = nullptr;
@@ -73,4 +74,4 @@ class OperatorConsole : public SessionClient {
   Stamp paced_at_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -9,7 +9,7 @@
 #include "core/photometric_response.h"
 #include "scene/command_text.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 using scene::ActionId;
@@ -28,13 +28,13 @@ const char* const k_screens[] = {"camera + what light cannot show",
                                  "stereo",
                                  "nothing"};
 
-float cell_height(const Gui& gui) { return 1.35F * gui.em(); }
+float cell_height(const gui::Gui& gui) { return 1.35F * gui.em(); }
 
 ImU32 colour_of(const std::optional<Track>& track) {
-  if (!track) return colour::k_quiet;
-  return track->tracking == TrackingState::measured       ? colour::k_good
-         : track->tracking == TrackingState::extrapolated ? colour::k_warn
-                                                          : colour::k_bad;
+  if (!track) return gui::colour::k_quiet;
+  return track->tracking == TrackingState::measured       ? gui::colour::k_good
+         : track->tracking == TrackingState::extrapolated ? gui::colour::k_warn
+                                                          : gui::colour::k_bad;
 }
 
 std::string words_of(const std::optional<Track>& track) {
@@ -44,7 +44,7 @@ std::string words_of(const std::optional<Track>& track) {
                                                           : "lost";
 }
 
-void dot(const Gui& gui, ImU32 colour) {
+void dot(const gui::Gui& gui, ImU32 colour) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const float r = 0.28F * gui.em();
   ImGui::GetWindowDrawList()->AddCircleFilled({at.x + r, at.y + 0.55F * gui.em()}, r, colour);
@@ -62,9 +62,9 @@ void right_text(ImU32 colour, const std::string& text) {
 }
 
 // A small button after the line's text; highlighted when something was chosen with it.
-bool small_button(const Gui& gui, const char* name, bool is_lit) {
+bool small_button(const gui::Gui& gui, const char* name, bool is_lit) {
   ImGui::SameLine(0, 0.8F * gui.em());
-  ImGui::PushStyleColor(ImGuiCol_Text, is_lit ? colour::k_blue : colour::k_quiet);
+  ImGui::PushStyleColor(ImGuiCol_Text, is_lit ? gui::colour::k_blue : gui::colour::k_quiet);
   const bool is_clicked = ImGui::SmallButton(name);
   ImGui::PopStyleColor();
   return is_clicked;
@@ -118,7 +118,7 @@ void draw_plot(const std::vector<ShownFrame>& recent, ImVec2 size) {
   const ImVec2 at = ImGui::GetCursorScreenPos();
   ImGui::Dummy(size);
   ImDrawList& draw = *ImGui::GetWindowDrawList();
-  draw.AddRectFilled(at, {at.x + size.x, at.y + size.y}, colour::k_ground, 3);
+  draw.AddRectFilled(at, {at.x + size.x, at.y + size.y}, gui::colour::k_ground, 3);
   if (recent.size() < 2) return;
   const std::size_t begin = recent.size() > k_points ? recent.size() - k_points : 0;
   double most = 0;
@@ -130,23 +130,23 @@ void draw_plot(const std::vector<ShownFrame>& recent, ImVec2 size) {
     return ImVec2(at.x + size.x - step * static_cast<float>(recent.size() - 1 - i),
                   at.y + text + 4 + height * static_cast<float>(1 - ms / top));
   };
-  draw.AddLine({at.x, at.y + text + 4}, {at.x + size.x, at.y + text + 4}, colour::k_line);
+  draw.AddLine({at.x, at.y + text + 4}, {at.x + size.x, at.y + text + 4}, gui::colour::k_line);
   std::vector<ImVec2> line;
   for (std::size_t i = begin; i < recent.size(); ++i) {
     line.push_back(place(i, latency_ms(recent[i])));
     const float x = line.back().x;
     if (recent[i].lost > 0)
-      draw.AddRectFilled({x - step, at.y + size.y - foot}, {x, at.y + size.y}, colour::k_bad);
+      draw.AddRectFilled({x - step, at.y + size.y - foot}, {x, at.y + size.y}, gui::colour::k_bad);
     if (recent[i].missed > 0)
-      draw.AddLine({x, at.y + size.y - foot - 8}, {x, at.y + size.y - foot}, colour::k_warn, 2);
+      draw.AddLine({x, at.y + size.y - foot - 8}, {x, at.y + size.y - foot}, gui::colour::k_warn, 2);
   }
-  draw.AddPolyline(line.data(), static_cast<int>(line.size()), colour::k_blue, 0, 2);
-  draw.AddText({at.x + 6, at.y + 1}, colour::k_quiet, fmt::format("{:.0f} ms", top).c_str());
+  draw.AddPolyline(line.data(), static_cast<int>(line.size()), gui::colour::k_blue, 0, 2);
+  draw.AddText({at.x + 6, at.y + 1}, gui::colour::k_quiet, fmt::format("{:.0f} ms", top).c_str());
 }
 
 // The times of the stages, and a plot of the latency.
-void draw_telemetry(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Latency, camera to light");
+void draw_telemetry(const gui::Gui& gui, const OperatorView& view) {
+  gui::heading(gui, "Latency, camera to light");
   if (view.recent.empty()) {
     ImGui::TextDisabled("no frame shown yet");
     return;
@@ -157,7 +157,7 @@ void draw_telemetry(const Gui& gui, const OperatorView& view) {
     missed += frame.missed;
     lost += frame.lost > 0;
   }
-  right_text(colour::k_text, fmt::format("{:.0f} ms", mean(second, latency_ms)));
+  right_text(gui::colour::k_text, fmt::format("{:.0f} ms", mean(second, latency_ms)));
   const float lines = 2 * ImGui::GetTextLineHeightWithSpacing();
   const ImVec2 room = ImGui::GetContentRegionAvail();
   draw_plot(view.recent, {room.x, std::max(2 * gui.em(), room.y - lines)});
@@ -171,13 +171,14 @@ void draw_telemetry(const Gui& gui, const OperatorView& view) {
   for (const auto& [name, value] : all)
     if (const double ms = mean(second, value); ms >= 0)
       stages += fmt::format("{}{} {:.1f}", stages.empty() ? "" : " · ", name, ms);
-  text_within(room.x, colour::k_quiet, stages + " ms");
-  text_within(room.x, missed + lost > 0 ? colour::k_warn : colour::k_quiet,
-              fmt::format("{} frames missed · bodies lost in {} of {}", missed, lost, view.recent.size()));
+  gui::text_within(room.x, gui::colour::k_quiet, stages + " ms");
+  gui::text_within(
+      room.x, missed + lost > 0 ? gui::colour::k_warn : gui::colour::k_quiet,
+      fmt::format("{} frames missed · bodies lost in {} of {}", missed, lost, view.recent.size()));
 }
 
-void draw_notices(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Messages");
+void draw_notices(const gui::Gui& gui, const OperatorView& view) {
+  gui::heading(gui, "Messages");
   ImGui::BeginChild("lines");
   for (auto notice = view.notices.rbegin(); notice != view.notices.rend(); ++notice) {
     ImGui::TextDisabled("%s", clock_of(notice->at_s).c_str());
@@ -190,12 +191,12 @@ void draw_notices(const Gui& gui, const OperatorView& view) {
   ImGui::EndChild();
 }
 
-void draw_devices(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Devices");
+void draw_devices(const gui::Gui& gui, const OperatorView& view) {
+  gui::heading(gui, "Devices");
   for (const OperatorView::Device& device : view.devices) {
-    dot(gui, device.state.works ? colour::k_good : colour::k_bad);
+    dot(gui, device.state.works ? gui::colour::k_good : gui::colour::k_bad);
     ImGui::TextUnformatted(device.state.name.c_str());
-    right_text(device.state.works ? colour::k_quiet : colour::k_bad,
+    right_text(device.state.works ? gui::colour::k_quiet : gui::colour::k_bad,
                !device.state.works ? "gone"
                : device.per_second ? fmt::format("{:.0f} /s", *device.per_second)
                                    : "works");
@@ -208,13 +209,13 @@ void draw_devices(const Gui& gui, const OperatorView& view) {
   }
 }
 
-void draw_bodies(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Markers");
+void draw_bodies(const gui::Gui& gui, const OperatorView& view) {
+  gui::heading(gui, "Markers");
   for (const OperatorView::Body& body : view.bodies) {
     dot(gui, colour_of(body.track));
     const std::string state = words_of(body.track);
     const float room = ImGui::GetContentRegionAvail().x - ImGui::CalcTextSize(state.c_str()).x - gui.em();
-    text_within(room, colour::k_text, body.name);
+    gui::text_within(room, gui::colour::k_text, body.name);
     if (ImGui::IsItemHovered()) ImGui::SetTooltip("%s", body.markers.c_str());
     right_text(colour_of(body.track), state);
     if (!body.track || body.track->tracking != TrackingState::measured) continue;
@@ -234,30 +235,31 @@ const OperatorView::Device* device_of(const OperatorView& view, const std::strin
 
 }  // namespace
 
-void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
+void OperatorPanel::draw_bar(const gui::Gui& gui, const OperatorView& view) {
   const scene::ShowState& show_state = view.show_state;
   const ImVec2 size{0, 1.9F * gui.em()};
-  if (toggle("Blackout", show_state.blackout, colour::k_warn, size)) ask(ActionId::blackout);
+  if (gui::toggle("Blackout", show_state.blackout, gui::colour::k_warn, size)) ask(ActionId::blackout);
   ImGui::SameLine();
-  if (toggle("Freeze", show_state.frozen, colour::k_warn, size)) ask(ActionId::freeze);
+  if (gui::toggle("Freeze", show_state.frozen, gui::colour::k_warn, size)) ask(ActionId::freeze);
   ImGui::SameLine();
-  if (toggle("Marker rings", show_state.marker_states, colour::k_blue, size)) ask(ActionId::marker_states);
+  if (gui::toggle("Marker rings", show_state.marker_states, gui::colour::k_blue, size))
+    ask(ActionId::marker_states);
   ImGui::SameLine();
-  if (toggle("Grid", show_state.grid, colour::k_blue, size)) ask(ActionId::grid);
+  if (gui::toggle("Grid", show_state.grid, gui::colour::k_blue, size)) ask(ActionId::grid);
   if (!view.recalibration_progress.empty()) {
     ImGui::SameLine();
     ImGui::AlignTextToFramePadding();
     ImGui::TextUnformatted(("Repair: " + view.recalibration_progress).c_str());
   } else if (!view.moved.empty()) {
     ImGui::SameLine();
-    if (toggle("Repair " + view.moved, true, colour::k_bad, size)) ask(ActionId::repair);
+    if (gui::toggle("Repair " + view.moved, true, gui::colour::k_bad, size)) ask(ActionId::repair);
     if (ImGui::IsItemHovered())
       ImGui::SetTooltip("%s",
                         "This device has moved. A repair shows patterns on the prototype for about 15 s.");
   }
   if (view.remote) {
     ImGui::SameLine();
-    if (toggle("Remote", shows_remote_, colour::k_blue, size)) shows_remote_ = !shows_remote_;
+    if (gui::toggle("Remote", shows_remote_, gui::colour::k_blue, size)) shows_remote_ = !shows_remote_;
   }
   ImGui::SameLine(0, 1.5F * gui.em());
   ImGui::PushStyleVar(ImGuiStyleVar_FramePadding, {10, 0.45F * gui.em()});
@@ -273,7 +275,7 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
     ImGui::EndCombo();
   }
   ImGui::AlignTextToFramePadding();
-  right_text(colour::k_quiet,
+  right_text(gui::colour::k_quiet,
              view.recent.empty()
                  ? clock_of(view.at_s)
                  : fmt::format("{:.0f} /s   {}", per_second(last_second(view.recent)), clock_of(view.at_s)));
@@ -281,7 +283,7 @@ void OperatorPanel::draw_bar(const Gui& gui, const OperatorView& view) {
 }
 
 // Returns true when the image was clicked.
-bool OperatorPanel::draw_image(Gui& gui,
+bool OperatorPanel::draw_image(gui::Gui& gui,
                                const OperatorView::Image& image,
                                const OperatorView& view,
                                ImVec2 corner,
@@ -297,27 +299,27 @@ bool OperatorPanel::draw_image(Gui& gui,
     words += fmt::format(" · {} marker{}", image.found.size(), image.found.size() == 1 ? "" : "s");
   if (is_gone) words += " · gone";
   ImGui::PushClipRect(corner, {corner.x + size.x, corner.y + size.y}, true);
-  draw.AddText({corner.x + 2, corner.y}, is_gone ? colour::k_bad : colour::k_quiet, words.c_str());
+  draw.AddText({corner.x + 2, corner.y}, is_gone ? gui::colour::k_bad : gui::colour::k_quiet, words.c_str());
   draw.AddRectFilled(inner_corner, {corner.x + size.x, corner.y + size.y}, IM_COL32(12, 13, 15, 255), 3);
   const std::string texture = image.name + (is_large ? " large" : "");
-  const PlacedImage placed = gui.image(texture, image.image, inner_corner, inner, image.is_linear);
+  const gui::PlacedImage placed = gui.image(texture, image.image, inner_corner, inner, image.is_linear);
   for (const OperatorView::Found& found : image.found) {
     std::array<ImVec2, 4> corners;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = placed.of(found.corners_px[i]);
-    draw.AddPolyline(corners.data(), 4, colour::k_good, ImDrawFlags_Closed, 2);
-    if (is_large) label_at(corners[1], colour::k_good, found.marker);
+    draw.AddPolyline(corners.data(), 4, gui::colour::k_good, ImDrawFlags_Closed, 2);
+    if (is_large) gui::label_at(corners[1], gui::colour::k_good, found.marker);
   }
   if (is_gone)
     draw.AddRectFilled(inner_corner, {corner.x + size.x, corner.y + size.y}, IM_COL32(20, 22, 26, 170));
   if (image.image.empty())
-    label_at({inner_corner.x + 10, inner_corner.y + 8}, colour::k_quiet, "no image yet");
+    gui::label_at({inner_corner.x + 10, inner_corner.y + 8}, gui::colour::k_quiet, "no image yet");
   ImGui::PopClipRect();
   ImGui::SetCursorScreenPos(inner_corner);
   return ImGui::InvisibleButton(texture.c_str(), {std::max(1.F, inner.x), std::max(1.F, inner.y)});
 }
 
 // Draws one image large and all of them small below; a click on a small one makes it the large one.
-void OperatorPanel::draw_images(Gui& gui, const OperatorView& view, ImVec2 size) {
+void OperatorPanel::draw_images(gui::Gui& gui, const OperatorView& view, ImVec2 size) {
   std::vector<const OperatorView::Image*> all;
   for (const OperatorView::Image& image : view.cameras) all.push_back(&image);
   if (view.show_state.screen != scene::Screen::off) all.push_back(&view.screen);
@@ -335,12 +337,13 @@ void OperatorPanel::draw_images(Gui& gui, const OperatorView& view, ImVec2 size)
     if (draw_image(gui, *all[i], view, at, {width, height}, false)) large_ = all[i]->name;
     if (all[i] == &large)
       ImGui::GetWindowDrawList()->AddRect({at.x - 2, at.y + cell_height(gui) - 2},
-                                          {at.x + width + 2, at.y + height + 2}, colour::k_blue, 3, 0, 2);
+                                          {at.x + width + 2, at.y + height + 2}, gui::colour::k_blue, 3, 0,
+                                          2);
   }
 }
 
 // Draws, in place of the images, the QR code for a phone's camera, and the address and PIN to type.
-void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size) {
+void OperatorPanel::draw_remote(gui::Gui& gui, const OperatorView& view, ImVec2 size) {
   const OperatorView::Remote& remote = *view.remote;
   if (remote.entrances.empty()) return;
   const OperatorView::Remote::Entrance& chosen =
@@ -351,22 +354,22 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
   if (!chosen.code.empty()) gui.image("code of " + name_of(chosen.role), chosen.code, corner, {side, side});
   ImGui::SetCursorPos({at.x + side + gap, at.y});
   ImGui::BeginChild("remote", {size.x - side - gap, size.y}, false, ImGuiWindowFlags_AlwaysUseWindowPadding);
-  heading(gui, "Remote");
+  gui::heading(gui, "Remote");
   ImGui::PushFont(gui.heading());
   ImGui::TextUnformatted(remote.url.c_str());
   ImGui::PopFont();
   ImGui::TextDisabled("The code pairs with the highlighted role.");
   ImGui::Dummy({0, 0.4F * gui.em()});
   for (std::size_t i = 0; i < remote.entrances.size(); ++i)
-    if (toggle(fmt::format("{}   {}", remote.entrances[i].pin, name_of(remote.entrances[i].role)),
-               &remote.entrances[i] == &chosen, colour::k_blue, {12 * gui.em(), 1.9F * gui.em()}))
+    if (gui::toggle(fmt::format("{}   {}", remote.entrances[i].pin, name_of(remote.entrances[i].role)),
+                    &remote.entrances[i] == &chosen, gui::colour::k_blue, {12 * gui.em(), 1.9F * gui.em()}))
       entrance_ = i;
   if (!view.projectors.empty()) {
     ImGui::Dummy({0, 0.4F * gui.em()});
     ImGui::TextDisabled("Project the code for 60 s with");
     for (const OperatorView::Image& projector : view.projectors)
-      if (toggle(projector.name, projector.name == remote.projector, colour::k_warn,
-                 {12 * gui.em(), 1.9F * gui.em()}))
+      if (gui::toggle(projector.name, projector.name == remote.projector, gui::colour::k_warn,
+                      {12 * gui.em(), 1.9F * gui.em()}))
         asked_.code = {projector.name, chosen.role};
   }
   draw_viewers(gui, view);
@@ -385,35 +388,36 @@ void OperatorPanel::draw_remote(Gui& gui, const OperatorView& view, ImVec2 size)
 }
 
 // Lets the operator choose the viewpoint for `view` parts: the scene's own viewer or a guest's tablet.
-void OperatorPanel::draw_viewers(const Gui& gui, const OperatorView& view) {
+void OperatorPanel::draw_viewers(const gui::Gui& gui, const OperatorView& view) {
   const std::string& chosen = view.show_state.viewer;
   std::vector<std::string> all = view.windows;
   if (!chosen.empty() && std::find(all.begin(), all.end(), chosen) == all.end()) all.push_back(chosen);
   ImGui::Dummy({0, 0.8F * gui.em()});
-  heading(gui, "Viewpoint for the parts");
+  gui::heading(gui, "Viewpoint for the parts");
   if (all.empty()) ImGui::TextDisabled("the scene's own viewer: no tablet view is open");
   if (all.empty()) return;
   const ImVec2 size{18 * gui.em(), 1.9F * gui.em()};
-  if (toggle("the scene's own viewer", chosen.empty(), colour::k_blue, size)) ask(ActionId::viewer);
+  if (gui::toggle("the scene's own viewer", chosen.empty(), gui::colour::k_blue, size)) ask(ActionId::viewer);
   for (const std::string& guest : all) {
     ImGui::PushID(guest.c_str());
-    if (toggle(guest + "'s tablet", guest == chosen, colour::k_blue, size)) ask(ActionId::viewer, "", guest);
+    if (gui::toggle(guest + "'s tablet", guest == chosen, gui::colour::k_blue, size))
+      ask(ActionId::viewer, "", guest);
     ImGui::PopID();
     if (guest != chosen || guest == view.follows) continue;
     ImGui::TextDisabled("sees no markers; the scene's own viewer is used");
   }
 }
 
-void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Parts");
+void OperatorPanel::draw_slots(const gui::Gui& gui, const OperatorView& view) {
+  gui::heading(gui, "Parts");
   const ImVec2 arrow{1.9F * gui.em(), 1.7F * gui.em()};
   for (std::size_t i = 0; i < view.slots.size(); ++i) {
     const OperatorView::Slot& slot = view.slots[i];
     ImGui::PushID(slot.name.c_str());
     const std::string& shown = view.show_state.slots[i].variant;
-    text_within(ImGui::GetContentRegionAvail().x - 6 * gui.em(),
-                slot.is_chosen ? colour::k_blue : colour::k_quiet,
-                slot.is_chosen && view.slots.size() > 1 ? slot.name + "  (keys)" : slot.name);
+    gui::text_within(ImGui::GetContentRegionAvail().x - 6 * gui.em(),
+                     slot.is_chosen ? gui::colour::k_blue : gui::colour::k_quiet,
+                     slot.is_chosen && view.slots.size() > 1 ? slot.name + "  (keys)" : slot.name);
     draw_material(gui, slot.name, view.show_state.slots[i].material);
     if (ImGui::Button("◀", arrow)) ask(ActionId::previous_variant, slot.name);
     ImGui::SameLine(0, 4);
@@ -445,7 +449,7 @@ void OperatorPanel::draw_slots(const Gui& gui, const OperatorView& view) {
 }
 
 // A popup for a part's colour, metalness and roughness.
-void OperatorPanel::draw_material(const Gui& gui,
+void OperatorPanel::draw_material(const gui::Gui& gui,
                                   const std::string& slot,
                                   const scene::MaterialOverride& now) {
   if (small_button(gui, "material", !now.is_none())) ImGui::OpenPopup("material");
@@ -467,7 +471,7 @@ void OperatorPanel::draw_material(const Gui& gui,
 }
 
 // A popup for the light that parts are shaded by.
-void OperatorPanel::draw_light(const Gui& gui, const scene::ShowState& show_state) {
+void OperatorPanel::draw_light(const gui::Gui& gui, const scene::ShowState& show_state) {
   if (small_button(gui, "light", show_state.light.has_value())) ImGui::OpenPopup("light");
   const auto numbers = show_state.light
                            ? scene::room_light_numbers(*show_state.light, show_state.d_front_world)
@@ -489,8 +493,8 @@ void OperatorPanel::draw_light(const Gui& gui, const scene::ShowState& show_stat
   ImGui::EndPopup();
 }
 
-void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
-  heading(gui, "Looks");
+void OperatorPanel::draw_looks(const gui::Gui& gui, const OperatorView& view) {
+  gui::heading(gui, "Looks");
   draw_light(gui, view.show_state);
   const float save = 4 * gui.em();
   ImGui::SetNextItemWidth(ImGui::GetContentRegionAvail().x - save - ImGui::GetStyle().ItemSpacing.x);
@@ -506,7 +510,7 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
     ImGui::PushID(look.name.c_str());
     const float cross = 1.6F * gui.em();
     const float room = ImGui::GetContentRegionAvail().x - cross - 4;
-    if (toggle(look.name, look.name == view.show_state.look, colour::k_blue, {room, 0}))
+    if (gui::toggle(look.name, look.name == view.show_state.look, gui::colour::k_blue, {room, 0}))
       ask(ActionId::restore_look, "", look.name);
     ImGui::SameLine(0, 4);
     if (ImGui::Button("x", {cross, 0})) ImGui::OpenPopup("delete");
@@ -524,13 +528,13 @@ void OperatorPanel::draw_looks(const Gui& gui, const OperatorView& view) {
 }
 
 // Controls that compare with the previous look: in its place, or left of a line.
-void OperatorPanel::draw_comparison(const Gui& gui, const scene::ShowState& show_state) {
+void OperatorPanel::draw_comparison(const gui::Gui& gui, const scene::ShowState& show_state) {
   if (show_state.other_look.empty()) return;
   const float room = ImGui::GetContentRegionAvail().x, gap = ImGui::GetStyle().ItemSpacing.x;
   const ImVec2 half{0.5F * (room - gap), 1.9F * gui.em()};
   if (ImGui::Button(fmt::format("A/B: {}", show_state.other_look).c_str(), half)) ask(ActionId::flip);
   ImGui::SameLine();
-  if (toggle("Side by side", show_state.split, colour::k_blue, half)) ask(ActionId::split);
+  if (gui::toggle("Side by side", show_state.split, gui::colour::k_blue, half)) ask(ActionId::split);
   if (!show_state.split) return;
   float mm = static_cast<float>(show_state.split_mm);
   ImGui::SetNextItemWidth(-1);
@@ -539,7 +543,7 @@ void OperatorPanel::draw_comparison(const Gui& gui, const scene::ShowState& show
 }
 
 // Asks whether to end the session: a stray Escape from a clicker must not end it.
-void OperatorPanel::draw_question(const Gui& gui) {
+void OperatorPanel::draw_question(const gui::Gui& gui) {
   constexpr const char* k_name = "End the session?";
   if (asks_to_end_ && !ImGui::IsPopupOpen(k_name)) ImGui::OpenPopup(k_name);
   const ImVec2 size = ImGui::GetIO().DisplaySize;
@@ -556,7 +560,7 @@ void OperatorPanel::draw_question(const Gui& gui) {
   ImGui::EndPopup();
 }
 
-OperatorAsked OperatorPanel::draw(Gui& gui, const OperatorView& view) {
+OperatorAsked OperatorPanel::draw(gui::Gui& gui, const OperatorView& view) {
   asked_ = {};
   draw_bar(gui, view);
   ImGui::Dummy({0, 0.1F * gui.em()});
@@ -595,4 +599,4 @@ OperatorAsked OperatorPanel::draw(Gui& gui, const OperatorView& view) {
   return asked_;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -6,34 +6,34 @@
 #include "gui/gui.h"
 #include "session/operator_view.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Draws the operator's window: OperatorView -> ImGui -> what the operator requests. Keeps only the state of
 /// the window itself, such as the large image's name and a half-typed look name.
 class OperatorPanel {
  public:
   /// To be called within a frame of `gui`.
-  OperatorAsked draw(Gui& gui, const OperatorView& view);
+  OperatorAsked draw(gui::Gui& gui, const OperatorView& view);
   /// Opens the question whether to end the session; called again, closes it.
   void ask_to_end() { asks_to_end_ = !asks_to_end_; }
 
  private:
-  void draw_bar(const Gui& gui, const OperatorView& view);
-  void draw_images(Gui& gui, const OperatorView& view, ImVec2 size);
-  bool draw_image(Gui& gui,
+  void draw_bar(const gui::Gui& gui, const OperatorView& view);
+  void draw_images(gui::Gui& gui, const OperatorView& view, ImVec2 size);
+  bool draw_image(gui::Gui& gui,
                   const OperatorView::Image& image,
                   const OperatorView& view,
                   ImVec2 corner,
                   ImVec2 size,
                   bool is_large);
-  void draw_remote(Gui& gui, const OperatorView& view, ImVec2 size);
-  void draw_viewers(const Gui& gui, const OperatorView& view);
-  void draw_slots(const Gui& gui, const OperatorView& view);
-  void draw_material(const Gui& gui, const std::string& slot, const scene::MaterialOverride& now);
-  void draw_looks(const Gui& gui, const OperatorView& view);
-  void draw_light(const Gui& gui, const scene::ShowState& show_state);
-  void draw_comparison(const Gui& gui, const scene::ShowState& show_state);
-  void draw_question(const Gui& gui);
+  void draw_remote(gui::Gui& gui, const OperatorView& view, ImVec2 size);
+  void draw_viewers(const gui::Gui& gui, const OperatorView& view);
+  void draw_slots(const gui::Gui& gui, const OperatorView& view);
+  void draw_material(const gui::Gui& gui, const std::string& slot, const scene::MaterialOverride& now);
+  void draw_looks(const gui::Gui& gui, const OperatorView& view);
+  void draw_light(const gui::Gui& gui, const scene::ShowState& show_state);
+  void draw_comparison(const gui::Gui& gui, const scene::ShowState& show_state);
+  void draw_question(const gui::Gui& gui);
   void ask(scene::ActionId action, const std::string& slot = "", const std::string& value = "") {
     asked_.edits.push_back(scene::make_edit(action, slot, value));
   }
@@ -47,4 +47,4 @@ class OperatorPanel {
   std::size_t entrance_ = 1;  // index of the role whose code is shown
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

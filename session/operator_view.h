@@ -13,7 +13,7 @@
 #include "session/device_health.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// What the operator's window shows of a session at one moment.
 struct OperatorView {
@@ -88,4 +88,4 @@ struct OperatorAsked {
   bool ends = false;              ///< whether to end the session
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

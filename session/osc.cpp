@@ -8,7 +8,7 @@
 #include <memory>
 #include <optional>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 const std::string k_root = "/limn/";
@@ -279,4 +279,4 @@ std::vector<std::uint8_t> osc_message(const std::string& path, const std::vector
   return bytes;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -9,7 +9,7 @@
 #include "core/result.h"
 #include "scene/actions.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// An address of Open Sound Control 1.0 that a live session receives or sends.
 struct OscAddress {
@@ -38,4 +38,4 @@ Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram);
 using OscValue = std::variant<int, float, std::string>;
 std::vector<std::uint8_t> osc_message(const std::string& path, const std::vector<OscValue>& arguments);
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -7,7 +7,7 @@
 
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr auto k_longest_hearing = std::chrono::milliseconds(5);
@@ -132,4 +132,4 @@ void OscPort::put(const std::string& key, const std::string& path, std::vector<O
   told_[key] = std::move(arguments);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "session/telemetry.h"
 #include "session/udp_socket.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Receives edits from other programs and sends them the session's state, by OSC over UDP (docs/osc.md).
 /// Belongs to the session's thread and never waits. Datagrams that were not read yet are in the system's
@@ -52,4 +52,4 @@ class OscPort : public SessionClient {
   std::optional<Stamp> told_all_at_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

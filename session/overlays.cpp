@@ -6,7 +6,7 @@
 #include "session/feedback.h"
 #include "session/grid_and_split.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // A sign is drawn this many times larger and then made smaller, so that its edges are smooth.
@@ -100,4 +100,4 @@ void draw_pairing_overlay(const cv::Mat& sign,
   drawn.copyTo((*image)(box), share > 127);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -13,7 +13,7 @@
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 // Overlays are drawn over the projectors' images of the parts. They are values in a list, in drawing order;
 // only draw() draws them.
@@ -85,4 +85,4 @@ void draw_pairing_overlay(const cv::Mat& sign,
                           const Pose& world_from_prototype,
                           cv::Mat* image);
 
-}  // namespace limn::apps
+}  // namespace limn::session

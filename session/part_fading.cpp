@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_fading_gamma = 2.2;  // accurate enough to mix fading images
@@ -101,4 +101,4 @@ const PartFading::Label* PartFading::label(const std::string& slot) const {
   return found == labels_.end() ? nullptr : &found->second;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "scene/show_state.h"
 #include "session/frame_input.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Effects that last for a moment: parts whose marker was lost fade out, and the names of variants that were
 /// chosen just now are shown beside their markers.
@@ -62,4 +62,4 @@ class PartFading {
   std::map<std::string, Label> labels_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "tracker/family.h"
 #include "tracker/predict.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // A loose marker is tracked after it was seen in this many moments, and forgotten when unseen for this long.
@@ -91,7 +91,7 @@ Result<Perception> Perception::create(const scene::Scene& scene,
   }
   for (const Imager& camera : rig.cameras)
     out.camera_states_.push_back(
-        {tracker::Detector(families, {.encoding = encoding_of(rig, camera)}), gestures});
+        {tracker::Detector(families, {.encoding = tracker::encoding_of(rig, camera)}), gestures});
   out.used_at_.resize(scene.controls.size());
   out.percepts_.frames.resize(rig.cameras.size());
   out.percepts_.detections.resize(rig.cameras.size());
@@ -241,4 +241,4 @@ void Perception::read_gestures(std::span<const std::size_t> cameras) {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

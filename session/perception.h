@@ -14,7 +14,7 @@
 #include "tracker/detector.h"
 #include "tracker/gesture.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// A use of a control of the scene. `control` is its index; `steps` is -1 for a turn backwards.
 struct ControlUse {
@@ -110,4 +110,4 @@ class Perception {
   Percepts percepts_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Wait for frames before is_stopping_ is checked again.
@@ -55,4 +55,4 @@ void PerceptionThread::run() try {
   health_->note(fmt::format("the tracker stopped: this is a bug in Limn, please report it: {}", bug.what()));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "session/perception.h"
 #include "session/recording.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Runs perception on a thread of its own and keeps the newest percepts for take(). Control uses of percepts
 /// that were not taken are kept.
@@ -46,4 +46,4 @@ class PerceptionThread {
   std::thread thread_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

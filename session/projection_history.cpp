@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr std::size_t k_most = 30;  // about a second: longer than until a camera sees an image
@@ -27,4 +27,4 @@ const std::vector<cv::Mat>* ProjectionHistory::at(Stamp moment) const {
   return later == shown_.begin() ? nullptr : &std::prev(later)->images;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -6,7 +6,7 @@
 
 #include "core/frame.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The images that the projectors showed recently, so that each camera frame can be compared with the images
 /// that were projected when it was captured.
@@ -25,4 +25,4 @@ class ProjectionHistory {
   std::deque<Shown> shown_;  // oldest first
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

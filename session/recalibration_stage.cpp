@@ -2,7 +2,7 @@
 
 #include "session/frame_loop.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Wait for a device call of a recalibration.
@@ -48,4 +48,4 @@ void RecalibrationStage::resume() {
   if (std::exchange(is_paused_, false)) devices_->resume_perception();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -7,7 +7,7 @@
 #include "session/session.h"
 #include "session/session_output.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 class FrameClock;
 
@@ -16,7 +16,7 @@ class CaptureDevices {
  public:
   virtual ~CaptureDevices() = default;
   /// The device functions that a LiveRecalibration needs; images go to `writer`.
-  virtual WizardBackend backend(ImageWriter* writer) = 0;
+  virtual wizard::WizardBackend backend(ImageWriter* writer) = 0;
   /// Stops perception, because the cameras will see patterns. The session receives the last percepts from
   /// before.
   virtual void pause_perception(Session* session) = 0;
@@ -56,4 +56,4 @@ class RecalibrationStage {
   bool is_paused_ = false;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -8,7 +8,7 @@
 #include "core/image_io.h"
 #include "device/jpeg.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -244,4 +244,4 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   return setup;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -17,7 +17,7 @@
 #include "scene/actions.h"
 #include "session/frame_composer.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Everything that a session's images depend on besides frames and edits.
 struct SessionSetup {
@@ -86,4 +86,4 @@ Result<Frame> load_frame(const std::filesystem::path& file);
 /// Reads the setup of a recorded session. Error: no session, another schema, a damaged file.
 Result<SessionSetup> load_setup(const std::filesystem::path& folder);
 
-}  // namespace limn::apps
+}  // namespace limn::session

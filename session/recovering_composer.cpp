@@ -1,6 +1,6 @@
 #include "session/recovering_composer.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_renew_every_s = 1;
@@ -39,4 +39,4 @@ std::optional<std::string> RecoveringComposer::compose_anew(const FrameInput& in
                      renewed.message());
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

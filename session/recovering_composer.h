@@ -8,7 +8,7 @@
 #include "session/frame_composer.h"
 #include "session/recording.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// A frame composer that survives the loss of its GL context. An image that was drawn while the context was
 /// lost is never shown: the last good images stay until all can be drawn again in a new context, which is
@@ -45,4 +45,4 @@ class RecoveringComposer {
   Stamp renewed_at_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -5,7 +5,7 @@
 
 #include "scene/actions.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// What people need to connect to the remote.
 struct Invitation {
@@ -31,4 +31,4 @@ class RemoteLink {
   virtual const Invitation& invitation() const = 0;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

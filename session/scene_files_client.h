@@ -5,7 +5,7 @@
 #include "session/scene_watch.h"
 #include "session/session_client.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Loads and shows the scene again when its files have changed.
 class SceneFilesClient final : public SessionClient {
@@ -21,4 +21,4 @@ class SceneFilesClient final : public SessionClient {
   SceneWatch files_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

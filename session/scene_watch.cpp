@@ -1,6 +1,6 @@
 #include "session/scene_watch.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -56,4 +56,4 @@ std::optional<Result<SceneNews>> SceneWatch::news() {
   return std::nullopt;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "core/result.h"
 #include "scene/scene.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// A scene as its files are now, and the variants that cannot be loaded.
 struct SceneNews {
@@ -41,4 +41,4 @@ class SceneWatch {
   std::future<Result<SceneNews>> loading_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -5,7 +5,7 @@
 #include "core/screen_encoding.h"
 #include "session/grid_and_split.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 const cv::Scalar k_background(40, 36, 34);  // background of rendered views: a dark room
@@ -66,4 +66,4 @@ cv::Mat ScreenComposer::composed(const cv::Mat& behind,
   return both;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

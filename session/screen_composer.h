@@ -14,7 +14,7 @@
 #include "scene/show_state.h"
 #include "session/frame_input.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The input for a screen's image.
 struct ScreenInput {
@@ -53,4 +53,4 @@ class ScreenComposer {
   Stamp treated_at_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -10,7 +10,7 @@
 #include "core/config.h"
 #include "core/names.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_never_s = 1e9;
@@ -289,4 +289,4 @@ Pose ScriptedRoom::world_from_marker(const MarkerName& marker, double at_s) cons
   return place_of(home_of(marker.text()), at_s);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include "scene/actions.h"
 #include "sim/virtual_rig.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The scripted events of a virtual session (limn.script/1; config/README.md explains the keys). Times are
 /// seconds of the session's clock.
@@ -115,4 +115,4 @@ class ScriptedRoom {
   std::vector<std::pair<std::string, Pose>> devices_;  // imager_from_world without a nudge
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -6,7 +6,7 @@
 #include "core/log.h"
 #include "core/stopwatch.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -270,4 +270,4 @@ cv::Mat Session::screen(scene::Screen what) {
   return composer ? composer->screen(percepts_, prediction_.at_image, show_state_, what) : cv::Mat();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

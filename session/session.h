@@ -24,7 +24,7 @@
 #include "session/tablet_registry.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// An edit that was applied, and who sent it.
 struct Edited {
@@ -150,4 +150,4 @@ class Session {
   double paint_ms_ = 0, record_ms_ = 0;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -8,7 +8,7 @@
 #include "session/session.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// What a session hands to its clients at one moment of its clock.
 struct SessionMoment {
@@ -40,4 +40,4 @@ class SessionClient {
   virtual bool ends_session() const { return false; }
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

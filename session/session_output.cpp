@@ -6,7 +6,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
@@ -98,4 +98,4 @@ Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& 
   return telemetry_.write_page(out_ / "session.html", "Limn session");
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -10,7 +10,7 @@
 #include "session/session.h"
 #include "session/telemetry.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Everything that a session writes while it runs.
 class SessionOutput {
@@ -44,4 +44,4 @@ class SessionOutput {
   bool told_of_recording_ = false;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -4,7 +4,7 @@
 
 #include "session/stillness.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr int k_patch_px = 8;
@@ -35,4 +35,4 @@ void ShadowWatch::update(const Percepts& percepts,
   for (std::size_t i = 0; i < rig_.projectors.size(); ++i) renderer->set_occlusion(i, arriving_.map(i));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -10,7 +10,7 @@
 #include "session/perception.h"
 #include "session/projection_history.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Finds light that people block, from the cameras' frames, and tells the renderer, which fills it in with
 /// other projectors.
@@ -32,4 +32,4 @@ class ShadowWatch {
   std::optional<Pose> placed_;  // world_from_prototype for which the patches were made
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

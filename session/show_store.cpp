@@ -7,7 +7,7 @@
 #include "core/log.h"
 #include "session/contact_sheet.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -137,4 +137,4 @@ std::vector<std::string> ShowStore::failures() {
   return writer_ ? writer_->failures() : std::vector<std::string>();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

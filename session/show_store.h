@@ -12,7 +12,7 @@
 #include "scene/show_state.h"
 #include "session/file_writer.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Keeps in the scene's folder what a session leaves there: looks with their images and an overview page
 /// (looks/), which marker carries which part (pairings.json), and answers about units
@@ -55,4 +55,4 @@ class ShowStore {
   std::unique_ptr<FileWriter> writer_;  // null: only reads
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
@@ -43,4 +43,4 @@ Pose steadied(std::optional<Pose>* held, std::vector<Track>* tracks) {
   return turned_from_world;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

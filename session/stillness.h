@@ -7,7 +7,7 @@
 #include "core/pose.h"
 #include "core/track.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 // The measured pose of a prototype that stands still jitters with the noise of its markers, and all that was
 // computed for its surface would be computed again for every frame. Two rules hold the pose. They have
@@ -30,4 +30,4 @@ void keep_still(const std::optional<Pose>& shown, const Eigen::AlignedBox3d& box
 /// (is_elsewhere), its new pose is held from now on. Returns turned_from_world, the motion that was applied.
 Pose steadied(std::optional<Pose>* held, std::vector<Track>* tracks);
 
-}  // namespace limn::apps
+}  // namespace limn::session

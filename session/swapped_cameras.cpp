@@ -6,7 +6,7 @@
 #include "tracker/body_correspondences.h"
 #include "tracker/body_pose.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_compare_cameras_every_s = 2;
@@ -80,4 +80,4 @@ void SwappedCamerasCheck::begin_anew(Stamp at) {
   compared_at_ = at;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -11,7 +11,7 @@
 #include "core/rig.h"
 #include "tracker/detection.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Finds two cameras whose images come under each other's names: with these names they see a body in two
 /// places, with the names exchanged all cameras see it in one place. `detections`: of one moment, one list
@@ -39,4 +39,4 @@ class SwappedCamerasCheck {
   bool has_told_ = false;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

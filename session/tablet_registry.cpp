@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::session {
 
 bool TabletRegistry::note(const std::string& guest,
                           const std::optional<Eigen::Vector3d>& p_eye_world,
@@ -21,4 +21,4 @@ bool TabletRegistry::note(const std::string& guest,
   return true;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

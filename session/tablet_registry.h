@@ -8,7 +8,7 @@
 
 #include "session/frame_input.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Keeps track of the guests whose tablets see markers, and of the positions of the tablets that the
 /// viewpoint depends on.
@@ -31,4 +31,4 @@ class TabletRegistry {
   std::vector<TabletViewpoint> places_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -10,7 +10,7 @@
 #include "core/html.h"
 #include "core/svg.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_least = 1e-4, k_growth = 1.02;
@@ -185,4 +185,4 @@ Status Telemetry::write_page(const std::filesystem::path& path, const std::strin
   return write_file(path, html_page(title, HtmlColours::dark, k_telemetry_style, html));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -10,7 +10,7 @@
 #include "core/result.h"
 #include "session/append_log.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Quantiles of many values >= 0 in fixed memory, within 1 %: a histogram whose bins grow by 2 %.
 class Quantiles {
@@ -75,4 +75,4 @@ class Telemetry {
   std::size_t frames_ = 0, missed_ = 0, with_lost_ = 0;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -7,7 +7,7 @@
 
 #include "core/names.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Half the view angle; the projection is nearly parallel.
@@ -50,4 +50,4 @@ cv::Mat draw_thumbnail(projector::Renderer* renderer,
   return renderer->view(imager, {std::nullopt, {{slot, variant, of->marker_from_part}}, {}}, k_ground);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

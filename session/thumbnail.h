@@ -6,7 +6,7 @@
 #include "projector/renderer.h"
 #include "scene/scene.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// Renders a variant alone, seen in front of its marker from a little above and to the right, so that it
 /// fills `side_px` x `side_px` pixels; sRGB BGR on a dark background. `renderer` must be made for `scene`,
@@ -17,4 +17,4 @@ cv::Mat draw_thumbnail(projector::Renderer* renderer,
                        const std::string& variant,
                        int side_px);
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -12,7 +12,7 @@
 #include <memory>
 #include <utility>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 struct FreeAddresses {
@@ -106,4 +106,4 @@ int UdpSocket::port() const {
                                              : reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -8,7 +8,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// "ADDRESS:PORT"; an IPv6 address stands in brackets.
 struct NetPlace {
@@ -44,4 +44,4 @@ class UdpSocket {
   int handle_ = -1;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

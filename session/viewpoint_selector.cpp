@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr double k_glide_s = 0.1;  // after this time a third of the way to a guest's new position remains
@@ -106,4 +106,4 @@ Imager ViewpointSelector::viewer_for(const scene::PosedScene& posed,
   return viewer ? *viewer : still ? *still : stand_in();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -14,7 +14,7 @@
 #include "scene/viewpoint.h"
 #include "session/frame_input.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The viewpoint that `view` parts are drawn for in a frame.
 struct SelectedViewpoint {
@@ -54,4 +54,4 @@ class ViewpointSelector {
   bool is_away_ = false;                   // the viewpoint depends on a guest, or moves back
 };
 
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -8,7 +8,7 @@
 #include "scene/mesh_bvh.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // The tilt of a marker is poorly measured when it is seen frontally, so the prototype is tilted.
@@ -141,12 +141,12 @@ Result<sim::World> room_for(const Rig& rig, const scene::Scene& scene) {
   prototype.world_from_object = world.world_from_prototype;
   world.objects.push_back(std::move(prototype));
   for (BodyMarker marker : scene.prototype->markers)
-    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, marker_image));
+    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, tracker::marker_image));
   for (const BodyMarker& marker : slot_markers(scene, from_face))
-    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, marker_image));
+    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, tracker::marker_image));
   for (const BodyMarker& marker : control_markers(scene, from_face))
-    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, marker_image));
+    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, tracker::marker_image));
   return world;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

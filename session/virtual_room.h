@@ -5,7 +5,7 @@
 #include "scene/scene.h"
 #include "sim/world.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// A virtual room for a rig and a scene, for sessions without connected devices. The rig's own devices stand
 /// as they were calibrated (with ordinary noise, blur and gamma). The prototype stands where their optical
@@ -13,4 +13,4 @@ namespace limn::apps {
 /// cameras or projectors, a scene without a prototype.
 Result<sim::World> room_for(const Rig& rig, const scene::Scene& scene);
 
-}  // namespace limn::apps
+}  // namespace limn::session

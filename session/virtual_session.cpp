@@ -11,7 +11,7 @@
 #include "session/scene_files_client.h"
 #include "wizard/capture/virtual_backend.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
@@ -161,7 +161,7 @@ class VirtualSink final : public FrameSink {
   }
 
   double placement_mm(const ComposedFrame& composed) const override {
-    return apps::placement_mm(composed, *session_, *room_, rig_->world());
+    return session::placement_mm(composed, *session_, *room_, rig_->world());
   }
 
  private:
@@ -185,8 +185,8 @@ class VirtualCapture final : public CaptureDevices {
  public:
   VirtualCapture(sim::VirtualRig* rig, VirtualSource* source) : rig_(rig), source_(source) {}
 
-  WizardBackend backend(ImageWriter* writer) override {
-    WizardBackend out = virtual_backend(no_board_, rig_, writer);
+  wizard::WizardBackend backend(ImageWriter* writer) override {
+    wizard::WizardBackend out = wizard::virtual_backend(no_board_, rig_, writer);
     for (std::size_t i = 0; i < rig_->world().rig.projectors.size(); ++i)
       out.use_latency(static_cast<int>(i), k_virtual_display_s);
     return out;
@@ -198,7 +198,7 @@ class VirtualCapture final : public CaptureDevices {
  private:
   sim::VirtualRig* rig_;
   VirtualSource* source_;
-  const Plan no_board_{};
+  const wizard::Plan no_board_{};
 };
 
 }  // namespace
@@ -224,4 +224,4 @@ Status play_virtually(double end_s,
   });
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

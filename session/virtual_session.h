@@ -7,7 +7,7 @@
 #include "session/script.h"
 #include "sim/virtual_rig.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 /// The virtual rig's delays: together 60 ms from a camera's exposure to the projected light that is made from
 /// it.
@@ -21,4 +21,4 @@ Status play_virtually(double end_s,
                       ScriptedRoom* room,
                       const SessionParts& parts);
 
-}  // namespace limn::apps
+}  // namespace limn::session

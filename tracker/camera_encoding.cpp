@@ -2,7 +2,7 @@
 
 #include "core/photometric_response.h"
 
-namespace limn::apps {
+namespace limn::tracker {
 
 tracker::Encoding encoding_of(const Rig& rig, const Imager& camera) {
   for (const CameraResponse& response : rig.camera_responses) {
@@ -13,4 +13,4 @@ tracker::Encoding encoding_of(const Rig& rig, const Imager& camera) {
   return tracker::Encoding::linear;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::tracker

@@ -5,10 +5,10 @@
 #include "core/marker.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::tracker {
 
 /// A marker's black square as the tracker draws it. It is passed to sim::load_world, because the virtual rig
 /// must not depend on the tracker.
 Result<cv::Mat> marker_image(const MarkerName& marker);
 
-}  // namespace limn::apps
+}  // namespace limn::tracker

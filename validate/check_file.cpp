@@ -12,7 +12,7 @@
 #include "core/scale_resolution.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -310,7 +310,7 @@ Result<Check> load_check(const fs::path& path) {
   const std::string scene_folder = scene ? scene->text() : "";
   LIMN_TRY_STATUS(config.status());
 
-  LIMN_TRY(check.truth, sim::load_world(world_file, marker_image));
+  LIMN_TRY(check.truth, sim::load_world(world_file, tracker::marker_image));
   if (!scene_folder.empty()) {
     LIMN_TRY(scene::Scene other, scene::load_scene((config.folder() / scene_folder).lexically_normal()));
     replace_scene(std::move(other), &check.truth);
@@ -335,4 +335,4 @@ Result<Check> load_check(const fs::path& path) {
   return check;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -12,7 +12,7 @@
 #include "sim/world.h"
 #include "validate/shadow_fill.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// A measure of `limn check`; its name is the key in a check file's `limits`.
 struct CheckMeasure {
@@ -52,4 +52,4 @@ struct Check {
 /// Reads a check file (limn.check/1, keys in config/README.md) with the world, scene and poses that it names.
 Result<Check> load_check(const std::filesystem::path& path);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -9,7 +9,7 @@
 
 #include "core/photometric_response.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr double k_over = 4;  // levels by which a pixel may be off
@@ -123,4 +123,4 @@ double p95_within(const cv::Mat& values, const cv::Mat& where) {
   return chosen[static_cast<std::size_t>(at)];
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -3,7 +3,7 @@
 #include <opencv2/core/mat.hpp>
 #include <string>
 
-namespace limn::apps {
+namespace limn::validate {
 
 constexpr double k_dark = 0.5 / 255;       // share of full light; darker pixels count as unlit
 constexpr double k_projector_gamma = 2.2;  // the renderer encodes for it if no response was measured
@@ -58,4 +58,4 @@ cv::Mat missing_luminance(const cv::Mat& more, const cv::Mat& less);
 /// The 95 % quantile of the values (CV_32F) at the pixels of `where`; 0 without such pixels.
 double p95_within(const cv::Mat& values, const cv::Mat& where);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

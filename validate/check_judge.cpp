@@ -8,7 +8,7 @@
 #include "validate/check_measures.h"
 #include "validate/check_run.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 struct Measures {
@@ -54,4 +54,4 @@ Result<CheckResult> judged(const Check& check) {
   return result;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

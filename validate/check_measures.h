@@ -3,7 +3,7 @@
 #include "core/result.h"
 #include "validate/check_run.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// Each function computes some measures of a check (README.md says what they compare) and stores values and
 /// images in `run`. Error: there is nothing to measure, such as no part in the image.
@@ -23,4 +23,4 @@ Status judge_black(CheckRun& run);        ///< black_step_share
 Status judge_refill(CheckRun& run);       ///< refill_...
 Status judge_rerun(CheckRun& run);        ///< rerun_worst_255
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -7,7 +7,7 @@
 #include "core/file.h"
 #include "core/html.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr int k_shown_width = 640;
@@ -120,4 +120,4 @@ std::string readable_value(const CheckMeasure& measure, double value) {
   return fmt::format("{:.3g}{}{}", value, measure.unit.starts_with('/') ? "" : " ", measure.unit);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

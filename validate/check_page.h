@@ -7,7 +7,7 @@
 #include "core/result.h"
 #include "validate/check_judge.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// Writes one HTML file that needs no other: a table of all readings, those that use most of their limit
 /// first, then the checks with their images.
@@ -21,4 +21,4 @@ std::string check_table(std::span<const CheckResult> results);
 /// A value or limit as people read it: "0.123 mm", "0.42 %".
 std::string readable_value(const CheckMeasure& measure, double value);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

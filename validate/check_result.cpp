@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace limn::apps {
+namespace limn::validate {
 
 double CheckReading::strain() const {
   const double used = limit.measure.least ? 1 - value : value,
@@ -17,4 +17,4 @@ bool CheckResult::good() const {
          std::all_of(readings.begin(), readings.end(), [](const CheckReading& r) { return r.good(); });
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -6,7 +6,7 @@
 
 #include "validate/check_file.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// A measured value with its limit.
 struct CheckReading {
@@ -36,4 +36,4 @@ struct CheckResult {
   bool good() const;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -4,7 +4,7 @@
 
 #include "validate/check_images.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 sim::World reduced_world(const Check& check) {
@@ -114,4 +114,4 @@ CheckResult CheckRun::result() && {
   return result;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

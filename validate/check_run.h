@@ -15,7 +15,7 @@
 #include "validate/check_result.h"
 #include "validate/reference_view.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// One check while it is measured. Data that several measures need is computed once, when it is first needed.
 class CheckRun {
@@ -85,4 +85,4 @@ constexpr double k_coat = 0.5;  // light of the coat; within 0.1 % of what a who
 constexpr int k_finer = 2;
 constexpr float k_whole = 0.999F;  // share of a viewer's pixel that counts as all of it
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -10,7 +10,7 @@
 #include "validate/check_measures.h"
 #include "validate/metrics.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr int k_edge_window = 5;        // viewer pixels: light and screen within 2 of each other meet
@@ -159,4 +159,4 @@ Status judge_depth_order(CheckRun& run) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -7,7 +7,7 @@
 #include "core/file.h"
 #include "core/html.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr int k_embedded_width = 1280;
@@ -53,4 +53,4 @@ std::string text_table(const std::vector<DemoRow>& rows) {
   return text;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -7,7 +7,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// A row of the demo's table: what was measured, the value, the limit.
 struct DemoRow {
@@ -37,4 +37,4 @@ Status write_demo_page(const DemoPage& page, const std::filesystem::path& path);
 /// The rows as a table for a terminal.
 std::string text_table(const std::vector<DemoRow>& rows);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -23,7 +23,7 @@
 #include "wizard/capture/virtual_capture.h"
 #include "wizard/measure/solve_captures.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -266,12 +266,13 @@ Result<Session> calibrated(const fs::path& out,
   const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
   std::error_code ignored;
   fs::remove_all(captures, ignored);
-  LIMN_TRY(const Plan plan, load_plan(fs::path(LIMN_SOURCE_DIR) / "config/plans/studio.json"));
-  LIMN_TRY_STATUS(phases->time("capture", [&] { return capture_virtually(plan, room, captures); }));
-  SolveCommandOptions solving;
+  LIMN_TRY(const wizard::Plan plan,
+           wizard::load_plan(fs::path(LIMN_SOURCE_DIR) / "config/plans/studio.json"));
+  LIMN_TRY_STATUS(phases->time("capture", [&] { return wizard::capture_virtually(plan, room, captures); }));
+  wizard::SolveCommandOptions solving;
   solving.captures = captures;
   solving.out = rig_folder;
-  LIMN_TRY(const calib::Report report, phases->time("solve", [&] { return solved(solving); }));
+  LIMN_TRY(const calib::Report report, phases->time("solve", [&] { return wizard::solved(solving); }));
   if (!keep_captures) fs::remove_all(captures, ignored);
   const Rig& rig = report.solution.rig;
   scene::Scene scene = room->world().scene.value();
@@ -418,7 +419,7 @@ double mask_iou(Session* session, const sim::World& world, const sim::Truth& tru
 
 Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   LIMN_TRY(sim::World world,
-           sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", marker_image));
+           sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image));
   sim::VirtualRig room(std::move(world));
   PhaseTimes phases;
   LIMN_TRY(Session session, calibrated(out, &room, &phases, keep_captures));
@@ -442,4 +443,4 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   return DemoResult{rows_of(measured), json_of(measured).dump(2) + "\n", std::move(images)};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -7,7 +7,7 @@
 #include "core/result.h"
 #include "validate/demo_page.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// What a demo measured, for people and for programs, and what it drew.
 struct DemoResult {
@@ -21,4 +21,4 @@ struct DemoResult {
 /// tracking, projection and composites. A GL context must be current.
 Result<DemoResult> play_demo(const std::filesystem::path& out, bool keep_captures);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

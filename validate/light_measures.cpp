@@ -4,7 +4,7 @@
 #include "validate/check_images.h"
 #include "validate/check_measures.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr float k_same_reach =
@@ -71,4 +71,4 @@ Status judge_spill(CheckRun& run) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -13,7 +13,7 @@
 #include "core/result.h"
 #include "sim/truth.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr double k_dot_radius_m = 0.0018;       // about 4 projector pixels across, for sub-pixel centroids
@@ -300,4 +300,4 @@ double worst_difference(std::span<const cv::Mat> a, std::span<const cv::Mat> b) 
   return worst;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

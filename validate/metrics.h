@@ -12,7 +12,7 @@
 #include "scene/mesh.h"
 #include "sim/world.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// Small white discs to be projected, each aimed at a point of the prototype's surface. Prototype frame.
 struct TargetDots {
@@ -63,4 +63,4 @@ double label_iou(const cv::Mat& found, const cv::Mat& truth);
 /// sizes differ.
 double worst_difference(std::span<const cv::Mat> a, std::span<const cv::Mat> b);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

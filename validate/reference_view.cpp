@@ -4,7 +4,7 @@
 
 #include "sim/sensor_model.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 cv::Mat binned(const cv::Mat& fine, int factor) {
   cv::Mat out;
@@ -41,4 +41,4 @@ std::vector<cv::Mat> ReferenceView::reaches() const {
   return reaches;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

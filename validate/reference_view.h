@@ -8,7 +8,7 @@
 #include "sim/trace.h"
 #include "sim/world.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// The mean of each block of factor x factor pixels.
 cv::Mat binned(const cv::Mat& fine, int factor);
@@ -32,4 +32,4 @@ struct ReferenceView {
   std::vector<cv::Mat> reaches() const;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::validate

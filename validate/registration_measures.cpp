@@ -10,7 +10,7 @@
 #include "validate/check_measures.h"
 #include "validate/metrics.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr int k_dot_count = 600;
@@ -111,4 +111,4 @@ Status judge_shared(CheckRun& run) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -3,7 +3,7 @@
 #include "validate/check_measures.h"
 #include "validate/metrics.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 Status judge_rerun(CheckRun& run) {
   LIMN_TRY(projector::Renderer again,
@@ -21,4 +21,4 @@ Status judge_rerun(CheckRun& run) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -11,7 +11,7 @@
 #include "validate/check_measures.h"
 #include "validate/reference_view.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr int k_seam_window = 9;  // viewer pixels, the window of a step
@@ -175,4 +175,4 @@ Status judge_black(CheckRun& run) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

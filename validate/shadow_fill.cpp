@@ -11,7 +11,7 @@
 #include "sim/trace.h"
 #include "validate/metrics.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 constexpr double k_period_s = 1 / 30.0;  // between the light of two frames
@@ -141,7 +141,7 @@ class Session {
   void monitor(const Traced& traced) {
     const Stamp at = shifted(Stamp{}, static_cast<double>(frames_ + 1) * k_period_s);
     history_.add(projected_, at);
-    Percepts percepts;
+    session::Percepts percepts;
     for (std::size_t i = 0; i < traced.cameras.size(); ++i)
       percepts.frames.push_back({world_.rig.cameras[i].name,
                                  sim::photograph(world_, traced.cameras[i], projected_, seed_ + frames_),
@@ -271,8 +271,8 @@ class Session {
   std::uint64_t seed_;
   std::uint64_t frames_ = 0;
   std::optional<projector::Renderer> renderer_;
-  ProjectionHistory history_;
-  std::optional<ShadowWatch> shadows_;
+  session::ProjectionHistory history_;
+  std::optional<session::ShadowWatch> shadows_;
   std::vector<cv::Mat> projected_, first_;
   cv::Mat before_;
   cv::Mat since_;  // CV_32S: number of frames that each pixel has been in the shadow
@@ -289,4 +289,4 @@ Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
   return Session(world, posed, viewer, hand, seed).run(scene);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -12,7 +12,7 @@
 #include "scene/scene.h"
 #include "sim/world.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// A person's hand in a projector's light, modelled as a sheet that faces the projector.
 struct Hand {
@@ -53,4 +53,4 @@ Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
                                                const Hand& hand,
                                                std::uint64_t seed);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -8,7 +8,7 @@
 #include "validate/check_measures.h"
 #include "validate/shadow_fill.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 // Uses the true world with its room and noise.
 Status judge_refill(CheckRun& run) {
@@ -34,4 +34,4 @@ Status judge_refill(CheckRun& run) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

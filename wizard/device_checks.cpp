@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 class Checks {
@@ -99,4 +99,4 @@ Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
   return std::move(checks.out);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

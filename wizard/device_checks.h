@@ -10,7 +10,7 @@
 #include "wizard/capture/exposure_check.h"
 #include "wizard/steps.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Results of the checks before the first pose.
 struct CheckedDevices {
@@ -26,4 +26,4 @@ Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
                                        const WizardBackend& backend,
                                        const WizardListener& listener);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -5,7 +5,7 @@
 
 #include "calib/judge/assess.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 using Rgb = std::array<std::uint8_t, 3>;
@@ -27,4 +27,4 @@ Rgb error_rgb(double mm) {
                     : mixed(k_amber, k_red, (mm - good) / (usable - good));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

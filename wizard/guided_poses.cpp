@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 // Position of the board's centre as shares of the image's width and height, its distance as a multiple of the
@@ -50,4 +50,4 @@ std::vector<Pose> guided_poses(const Imager& camera, const calib::Board& board) 
   return poses;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -5,7 +5,7 @@
 #include "calib/board/board.h"
 #include "core/imager.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// An imager with a typical field of view, used in place of a camera whose lens is not known yet.
 Imager assumed_camera(const std::string& name, int width, int height);
@@ -15,4 +15,4 @@ Imager assumed_camera(const std::string& name, int width, int height);
 /// image's width or height.
 std::vector<Pose> guided_poses(const Imager& camera, const calib::Board& board);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -8,7 +8,7 @@
 #include "calib/seed.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 using Eigen::Vector2d;
@@ -120,4 +120,4 @@ std::vector<Pose> placed_alike(const std::vector<Pose>& world_from_board,
   return places;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

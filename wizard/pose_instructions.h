@@ -8,7 +8,7 @@
 #include "core/pose.h"
 #include "core/rig.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// For each pose, where to hold the board, as one camera sees it: "left, low, near (1.12 m), tilted 25
 /// degrees up, turned 40 degrees clockwise". Left, low and clockwise are meant in the image; "tilted up"
@@ -31,4 +31,4 @@ std::vector<Pose> placed_alike(const std::vector<Pose>& world_from_board,
                                const Imager& assumed,
                                const Rig& rig);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -4,7 +4,7 @@
 
 #include "calib/report/advice.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr double k_settled = 0.05;  // share; the error has settled if it fell by less over two poses
@@ -37,4 +37,4 @@ std::string more_helps(const std::vector<PoseJudged>& poses) {
   return has_settled ? "" : "the predicted error is still falling";
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

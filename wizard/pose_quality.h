@@ -7,7 +7,7 @@
 #include "calib/judge/assess.h"
 #include "core/rig.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Quality of the calibration from all captures up to one pose.
 struct PoseJudged {
@@ -30,4 +30,4 @@ double predicted_mm(const calib::Assessment& assessment);
 /// counts only with as many poses as the report asks for.
 std::string more_helps(const std::vector<PoseJudged>& poses);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -13,7 +13,7 @@
 #include "wizard/measure/scan_alignment.h"
 #include "wizard/measure/scan_files.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -219,4 +219,4 @@ Result<std::optional<PrototypeSeen>> prototype_seen(const PrototypeSteps& steps,
   return Steps(steps, backend, listener).run();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

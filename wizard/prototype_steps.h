@@ -12,7 +12,7 @@
 #include "wizard/capture/backend.h"
 #include "wizard/steps.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Input of the wizard's last steps: scan, alignment and painting.
 struct PrototypeSteps {
@@ -41,4 +41,4 @@ Result<std::optional<PrototypeSeen>> prototype_seen(const PrototypeSteps& steps,
                                                     const WizardBackend& backend,
                                                     const WizardListener& listener);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -21,7 +21,7 @@
 #include "wizard/device_checks.h"
 #include "wizard/measure/solve_captures.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -227,9 +227,9 @@ class Run {
   }
 
   void judge(PoseJudged* judged) {
-    if (const Status done = apps::judge(*observed_, judged); !done) judged->unsolved = done.message();
+    if (const Status done = wizard::judge(*observed_, judged); !done) judged->unsolved = done.message();
     poses_.push_back(*judged);
-    judged->more_helps = poses_.back().more_helps = apps::more_helps(poses_);
+    judged->more_helps = poses_.back().more_helps = more_helps(poses_);
   }
 
   const calib::CaptureSet& captures_;
@@ -322,4 +322,4 @@ Result<Calibrated> calibrated(const WizardOptions& options,
   return done;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

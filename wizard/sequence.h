@@ -14,7 +14,7 @@
 #include "wizard/prototype_steps.h"
 #include "wizard/steps.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 struct WizardOptions {
   std::filesystem::path out;         ///< the rig folder; all images stay in its captures/
@@ -50,4 +50,4 @@ Result<Calibrated> calibrated(const WizardOptions& options,
                               const WizardBackend& backend,
                               const WizardListener& listener);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

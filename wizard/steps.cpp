@@ -2,7 +2,7 @@
 
 #include <array>
 
-namespace limn::apps {
+namespace limn::wizard {
 
 std::string to_text(WizardStep step) {
   static const std::array<const char*, k_wizard_steps> names = {
@@ -11,4 +11,4 @@ std::string to_text(WizardStep step) {
   return names.at(static_cast<std::size_t>(step));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

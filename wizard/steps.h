@@ -12,7 +12,7 @@
 #include "wizard/capture/request.h"
 #include "wizard/pose_quality.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// The wizard's steps, in their order.
 enum class WizardStep { devices, outputs, exposure, latency, board, solve, result, scan, align, paint };
@@ -34,4 +34,4 @@ struct WizardListener {
   std::atomic<WizardWish>* wish = nullptr;  ///< a person's request; set to none when it is followed
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -12,7 +12,7 @@
 #include "core/file.h"
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 static_assert(std::endian::native == std::endian::little, "STL is little-endian");
@@ -253,4 +253,4 @@ Status run_mount(const MountOptions& options) {
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -9,7 +9,7 @@
 #include "core/pose.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 struct MountOptions {
   double size_mm = 40;    ///< Side of the black square.
@@ -42,4 +42,4 @@ Mount marker_mount(const MountOptions& options);
 /// than .stl.
 Status run_mount(const MountOptions& options);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -16,7 +16,7 @@
 #include "core/image_io.h"
 #include "tracker/family.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 constexpr double k_points_per_mm = 72 / 25.4;
@@ -262,4 +262,4 @@ Result<std::string> write_board_sheet(const std::string& text, const std::filesy
   return board->text();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

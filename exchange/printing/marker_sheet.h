@@ -5,7 +5,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 struct MarkerSheetOptions {
   std::string family;         ///< Such as aruco_4x4_50; artoolkit:FILE is one marker.
@@ -30,4 +30,4 @@ Result<std::string> write_board_sheet(const std::string& board, const std::files
 /// The white margin around a marker whose black square has this side.
 double margin_mm(double size_mm);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -11,7 +11,7 @@
 #include "tracker/template_comparison.h"
 #include "tracker/template_training.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 using tracker::Discriminability;
@@ -98,4 +98,4 @@ Status compare_templates(const std::vector<std::filesystem::path>& files, const 
   return {};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 
 /// Writes the ARToolKit template of the one black frame in the image (tracker/template_training.h) and prints
 /// where the frame was found. `out` must end in .patt.
@@ -16,4 +16,4 @@ Status train_template(const std::filesystem::path& image, const std::filesystem:
 /// turned, the most similar first. Also writes this to `json` unless that is empty.
 Status compare_templates(const std::vector<std::filesystem::path>& files, const std::filesystem::path& json);
 
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -22,7 +22,7 @@ std::string tracking_name(const std::vector<Track>& tracks, const std::string& b
   return "lost";
 }
 
-SessionState::Slot slot_state(const apps::Session& session, std::size_t index) {
+SessionState::Slot slot_state(const session::Session& session, std::size_t index) {
   const scene::Scene& scene = session.setup().scene;
   const scene::Slot& slot = scene.slots[index];
   const scene::ShowState::Slot& staged = session.show_state().slots[index];
@@ -73,9 +73,9 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
 
 }  // namespace
 
-SessionState session_state(const apps::Session& session,
-                           const apps::Telemetry& telemetry,
-                           const apps::DeviceHealth& health,
+SessionState session_state(const session::Session& session,
+                           const session::Telemetry& telemetry,
+                           const session::DeviceHealth& health,
                            Stamp begun_at) {
   const scene::Scene& scene = session.setup().scene;
   const scene::ShowState& show_state = session.show_state();
@@ -101,7 +101,7 @@ SessionState session_state(const apps::Session& session,
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
-  for (const apps::LooseMarker& loose : apps::waiting_markers(scene, show_state, session.percepts()))
+  for (const session::LooseMarker& loose : session::waiting_markers(scene, show_state, session.percepts()))
     out.waiting.push_back(loose.marker.text());
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, begun_at);
@@ -150,7 +150,7 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["windows"] = state.windows;
   out["projectors"] = state.projectors;
   out["devices"] = nlohmann::ordered_json::array();
-  for (const apps::DeviceState& device : state.devices)
+  for (const session::DeviceState& device : state.devices)
     out["devices"].push_back(
         {{"name", device.name}, {"kind", device.kind}, {"works", device.works}, {"why", device.why}});
   out["waiting"] = state.waiting;

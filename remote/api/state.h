@@ -45,16 +45,16 @@ struct SessionState {
   std::vector<std::string> windows;  ///< Guests whose tablets can be the viewpoint.
   std::string repair;                ///< Progress of the recalibration; empty: none runs.
   std::vector<std::string> projectors;
-  std::vector<apps::DeviceState> devices;
+  std::vector<session::DeviceState> devices;
   std::vector<std::string> waiting;  ///< Loose markers that can be paired.
   std::vector<Note> notes;           ///< The newest last.
-  std::optional<apps::Edited> last_edit;
+  std::optional<session::Edited> last_edit;
 };
 
 /// The state of a session. `begun_at` is when it began; the times of notes count from there.
-SessionState session_state(const apps::Session& session,
-                           const apps::Telemetry& telemetry,
-                           const apps::DeviceHealth& health,
+SessionState session_state(const session::Session& session,
+                           const session::Telemetry& telemetry,
+                           const session::DeviceHealth& health,
                            Stamp begun_at);
 
 /// A state in which poses that differ from the published ones by less than the tracker's jitter (0.05 mm,

@@ -54,7 +54,7 @@ Status TabletWindows::receive_frame(const std::shared_ptr<WsClient>& client,
 bool TabletWindows::is_tablet_window(const std::shared_ptr<WsClient>& client, Clock::time_point now) const {
   const auto tablet = tablets_.find(client->guest.name);
   return tablet == tablets_.end() || tablet->second.client.lock() == client ||
-         now - tablet->second.used_at > std::chrono::duration<double>(apps::k_guest_place_lasts_s);
+         now - tablet->second.used_at > std::chrono::duration<double>(session::k_guest_place_lasts_s);
 }
 
 void TabletWindows::draw_frame(const std::shared_ptr<WsClient>& client, WsClient::Frame frame) {

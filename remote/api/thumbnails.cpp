@@ -32,7 +32,8 @@ Status Thumbnails::draw(const scene::Scene& scene) {
   for (const scene::Slot& slot : scene.slots)
     for (const scene::Variant& variant : slot.variants) {
       std::vector<std::uint8_t> png;
-      cv::imencode(".png", apps::draw_thumbnail(&renderer, scene, slot.name, variant.name, k_side_px), png);
+      cv::imencode(".png", session::draw_thumbnail(&renderer, scene, slot.name, variant.name, k_side_px),
+                   png);
       images_[{slot.name, variant.name}] = std::make_shared<const std::string>(png.begin(), png.end());
     }
   return {};

@@ -489,7 +489,7 @@ struct Network::Impl {
 
 Network::Network(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<Network>> Network::open(const apps::NetPlace& place,
+Result<std::unique_ptr<Network>> Network::open(const session::NetPlace& place,
                                                const std::optional<Certificate>& certificate,
                                                const NetworkLimits& limits) {
   auto impl = std::make_unique<Impl>(limits);

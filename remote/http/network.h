@@ -32,7 +32,7 @@ class Network {
  public:
   /// Binds the port. With a certificate only TLS is accepted. Errors: the address is not this machine's, or
   /// the port is in use. No request is answered before start().
-  static Result<std::unique_ptr<Network>> open(const apps::NetPlace& place,
+  static Result<std::unique_ptr<Network>> open(const session::NetPlace& place,
                                                const std::optional<Certificate>& certificate,
                                                const NetworkLimits& limits = {});
   ~Network();

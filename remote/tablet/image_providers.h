@@ -14,7 +14,7 @@ namespace limn::remote {
 /// destroyed. An empty function says that there are no such images.
 struct ImageProviders {
   /// Called after every frame of the session, on its thread.
-  std::function<void(const apps::Session&)> update_session;
+  std::function<void(const session::Session&)> update_session;
   std::function<void(const TabletWindow&, std::vector<std::uint8_t> jpeg, ImageCallback)> draw_window;
   std::function<void(ImageCallback)> draw_room;
 };
@@ -22,7 +22,7 @@ struct ImageProviders {
 /// The functions of a tablet view, which lives as long as they do.
 inline ImageProviders image_providers(std::unique_ptr<TabletView> tablet_view) {
   const std::shared_ptr<TabletView> shared = std::move(tablet_view);
-  return {[shared](const apps::Session& session) { shared->update_session(session); },
+  return {[shared](const session::Session& session) { shared->update_session(session); },
           [shared](const TabletWindow& window, std::vector<std::uint8_t> jpeg, ImageCallback answer) {
             shared->draw_window(window, std::move(jpeg), std::move(answer));
           },

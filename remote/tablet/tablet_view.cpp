@@ -51,7 +51,7 @@ struct SessionSnapshot {
   int scenes = 0;
   scene::ShowState show_state;
   std::vector<Track> tracks;  // at the moment of `room`
-  apps::ComposeOptions paint;
+  session::ComposeOptions paint;
   Frame room;
   std::string follows;  // the guest whose viewpoint `view` parts are projected for
 };
@@ -70,7 +70,7 @@ std::vector<Body> bodies_of(const scene::Scene& scene, const scene::ShowState& s
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     const MarkerName& carrier = scene::slot_marker(scene, show_state, i);
-    const double size_m = carrier == slot.marker ? slot.size_m : apps::loose_size_m(scene);
+    const double size_m = carrier == slot.marker ? slot.size_m : session::loose_size_m(scene);
     out.push_back({slot.name, {{carrier, size_m, Pose()}}});
   }
   return out;
@@ -289,12 +289,12 @@ cv::Mat TabletView::Impl::split_composite(const Imager& camera,
                                           SplitDrawState* draw_state) {
   const cv::Mat right = composite_of(camera, image, posed, snapshot, parts, &draw_state->right);
   const auto left = scene::left_of_split(*snapshot.scene, snapshot.show_state);
-  const auto line = left ? apps::split_line(camera, posed, prototype_box, snapshot.show_state.split_mm)
+  const auto line = left ? session::split_line(camera, posed, prototype_box, snapshot.show_state.split_mm)
                          : std::optional<cv::Vec3d>();
   if (!line) return right;
   const scene::PosedScene other = scene::compose_scene(*snapshot.scene, *left, tracks);
-  return apps::split_along(*line, composite_of(camera, image, other, snapshot, parts, &draw_state->left),
-                           right);
+  return session::split_along(*line, composite_of(camera, image, other, snapshot, parts, &draw_state->left),
+                              right);
 }
 
 // An image with parts. As the room's screen shows them, `view` parts are drawn whole if they are projected
@@ -347,7 +347,7 @@ CompositeImage TabletView::Impl::frame_with_parts(const WaitingFrame& frame,
 
   const Stamp tracking = std::chrono::steady_clock::now();
   std::vector<Track> tracks = tracks_of(snapshot);
-  const Pose turned_from_world = apps::steadied(&still_world_from_prototype, &tracks);
+  const Pose turned_from_world = session::steadied(&still_world_from_prototype, &tracks);
   Device& device = device_state(frame.window.device);
   const TabletPose observation =
       device.localizer.localize(*image, bodies_of(*snapshot.scene, snapshot.show_state), tracks);
@@ -409,7 +409,7 @@ CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot
   }
   std::vector<Track> tracks = tracks_of(snapshot);
   camera.imager_from_world =
-      camera.imager_from_world * apps::steadied(&still_world_from_prototype, &tracks).inverse();
+      camera.imager_from_world * session::steadied(&still_world_from_prototype, &tracks).inverse();
   const scene::PosedScene posed = scene::compose_scene(*snapshot.scene, snapshot.show_state, tracks);
   const cv::Mat out =
       split_composite(camera, image, posed, tracks, snapshot, TabletViewMode::as_screen, &room);
@@ -418,7 +418,7 @@ CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot
 
 TabletView::TabletView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<TabletView>> TabletView::create(const apps::SessionSetup& setup,
+Result<std::unique_ptr<TabletView>> TabletView::create(const session::SessionSetup& setup,
                                                        std::filesystem::path lens_folder) {
   auto impl = std::make_unique<Impl>();
   impl->rig = setup.rig;
@@ -450,13 +450,13 @@ TabletView::~TabletView() {
   impl_->thread.join();
 }
 
-void TabletView::update_session(const apps::Session& session) {
+void TabletView::update_session(const session::Session& session) {
   if (impl_->session_scenes != session.scenes()) {
     impl_->session_scene = std::make_shared<scene::Scene>(session.setup().scene);
     impl_->session_rig = std::make_shared<Rig>(session.setup().rig);
     impl_->session_scenes = session.scenes();
   }
-  const apps::Percepts& percepts = session.percepts();
+  const session::Percepts& percepts = session.percepts();
   auto snapshot = std::make_shared<SessionSnapshot>(
       SessionSnapshot{.scene = impl_->session_scene,
                       .rig = impl_->session_rig,

@@ -39,14 +39,14 @@ class TabletView {
  public:
   /// `lens_folder` keeps the estimates of lenses; it is made when there is something to save. Errors: no GL
   /// context, marker families that cannot be loaded, a scene that cannot be drawn.
-  static Result<std::unique_ptr<TabletView>> create(const apps::SessionSetup& setup,
+  static Result<std::unique_ptr<TabletView>> create(const session::SessionSetup& setup,
                                                     std::filesystem::path lens_folder);
   /// First answers everybody who still waits, without an image.
   ~TabletView();
 
   /// Copies what is drawn from the session: call it after every frame, on the session's thread. It is cheap;
   /// the scene is copied only when it has changed.
-  void update_session(const apps::Session& session);
+  void update_session(const session::Session& session);
 
   /// Draws the parts into a guest's image. May be called from any thread and returns at once. Of one device
   /// only the newest image is drawn; one that it replaces is answered without an image. `answer` is called

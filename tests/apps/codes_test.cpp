@@ -68,7 +68,7 @@ Calibrated calibrated(const fs::path& folder, const Json& world, const Json& cod
   EXPECT_TRUE(done.ok()) << done.message();
   if (!done.ok()) return {};
   return {read_json(folder / "rig/report.json"), load_rig(folder / "rig").value(),
-          sim::load_world(folder / "world.json", marker_image).value().rig};
+          sim::load_world(folder / "world.json", tracker::marker_image).value().rig};
 }
 
 // RMS distance between the light of the solved projector and of the true one for the same pixels, on what the

@@ -59,8 +59,8 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   const fs::path folder = test_folder();
   const fs::path sound_world = bench_world(folder / "sound.json", 0),
                  nudged_world = bench_world(folder / "nudged.json", 0.00444);
-  const Rig rig = sim::load_world(sound_world, marker_image).value().rig;
-  const Rig truth = sim::load_world(nudged_world, marker_image).value().rig;
+  const Rig rig = sim::load_world(sound_world, tracker::marker_image).value().rig;
+  const Rig truth = sim::load_world(nudged_world, tracker::marker_image).value().rig;
   const double turned = angle_between(rig.projectors[0].imager_from_world.rotation,
                                       truth.projectors[0].imager_from_world.rotation);
   ASSERT_NEAR(turned * 180 / std::numbers::pi, 0.2, 0.001);
@@ -127,8 +127,8 @@ TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {
   const fs::path folder = test_folder();
   studio_plan(folder / "sound", 0);
   const fs::path nudged_plan = studio_plan(folder / "nudged", 0.006);
-  const Rig rig = sim::load_world(folder / "sound/world.json", marker_image).value().rig;
-  const Rig truth = sim::load_world(folder / "nudged/world.json", marker_image).value().rig;
+  const Rig rig = sim::load_world(folder / "sound/world.json", tracker::marker_image).value().rig;
+  const Rig truth = sim::load_world(folder / "nudged/world.json", tracker::marker_image).value().rig;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
   const auto after = rechecked(
       {.rig = folder / "rig", .plan = nudged_plan, .prototype = true, .out = folder / "nudged/out"});
@@ -147,7 +147,7 @@ TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {
 
 TEST(RecheckCommand, WantsCapturesOrAPlan) {
   const fs::path folder = test_folder();
-  const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), marker_image).value().rig;
+  const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), tracker::marker_image).value().rig;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
   const auto neither = rechecked({.rig = folder / "rig", .out = folder / "out"});
   ASSERT_FALSE(neither);

@@ -229,9 +229,9 @@ TEST(Scan, LaysPosesOfAMovedPrototypeOntoEachOtherWhenTold) {
   const Pose elsewhere(exp_rotation({0.02, 0.05, 0.24}) * home.rotation,
                        home.translation + Vector3d(0.07, -0.05, 0.02));
   {
-    const Plan plan = load_plan(k_plan).value();
+    const wizard::Plan plan = wizard::load_plan(k_plan).value();
     sim::VirtualRig rig(test::bench_world());
-    ASSERT_TRUE(capture_prototype(plan, {home, elsewhere}, &rig, out / "captures").ok());
+    ASSERT_TRUE(wizard::capture_prototype(plan, {home, elsewhere}, &rig, out / "captures").ok());
   }
   ScanCommand command;
   command.captures = out / "captures";

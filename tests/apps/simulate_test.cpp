@@ -41,7 +41,7 @@ TEST(Simulate, WritesImagesTheTruthAndTheRig) {
 
   const auto json = test::read_json(out / "truth.json");
   EXPECT_EQ(json["slots"]["mirror"]["variant"], "sport");
-  const sim::World world = sim::load_world(k_bench, apps::marker_image).value();
+  const sim::World world = sim::load_world(k_bench, tracker::marker_image).value();
   const Rig rig = load_rig(out / "rig").value();
   ASSERT_EQ(json["markers"].size(), 10U);
   const auto& marker = json["markers"][0];

@@ -29,9 +29,9 @@ constexpr double k_max_cells_px = 0.165, k_max_worst_cells_px = 0.228;
 constexpr double k_max_corners_px = 0.262, k_max_worst_corners_px = 0.385;
 constexpr double k_max_held_out_px = 0.20;
 
-SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {
-  SolveCommandOptions options{.captures = data, .out = out};
-  options.import_format = ImportFormat::opencv_gray;
+wizard::SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {
+  wizard::SolveCommandOptions options{.captures = data, .out = out};
+  options.import_format = wizard::ImportFormat::opencv_gray;
   options.projector = "1024x768";
   options.board = "chessboard:9x7:75mm";
   options.poses = "capture_*";
@@ -237,7 +237,7 @@ TEST(SolvePhotographs, FiveRealPosesHoldOutByTheReportAndByAnIndependentJudge) {
   double worst_cells = 0, worst_corners = 0;
   for (int pose = 0; pose < 5; ++pose) {
     const std::string name = "capture_" + std::to_string(pose);
-    SolveCommandOptions options = five_poses(*data, folder / "without");
+    wizard::SolveCommandOptions options = five_poses(*data, folder / "without");
     options.skip_poses = {name};
     ASSERT_TRUE(run_solve(options).ok());
     const auto camera = load_cameramodel(folder / "without" / "camera0.cameramodel");

@@ -103,7 +103,7 @@ struct Stage {
   calib::BoardSheet bar() const {
     calib::BoardSheet made{cv::Mat(160, 420, CV_8U, cv::Scalar(255)), 1000, {49.5, -40.5}};
     for (const int id : {3, 7}) {
-      const cv::Mat marker = marker_image({"apriltag_36h11", std::to_string(id)}).value();
+      const cv::Mat marker = tracker::marker_image({"apriltag_36h11", std::to_string(id)}).value();
       cv::Mat grey;
       cv::resize(to_grey(marker), grey, {64, 64}, 0, 0, cv::INTER_NEAREST);
       grey.copyTo(made.image(cv::Rect(id == 3 ? 53 : 303, 48, 64, 64)));
@@ -260,7 +260,7 @@ TEST(SolveCommand, UsesASceneWithoutABoard) {
   Stage().capture(captures.parent_path() / "scene", 1, false);
   fs::rename(captures.parent_path() / "scene" / "pose00", captures / "pose03");
   fs::remove_all(captures.parent_path() / "scene");
-  const auto report = solved({.captures = captures, .out = captures.parent_path() / "scene rig"});
+  const auto report = wizard::solved({.captures = captures, .out = captures.parent_path() / "scene rig"});
   ASSERT_TRUE(report.ok()) << report.message();
   const calib::Observations& seen = report->observed.observations;
   ASSERT_GT(seen.points.size(), 50U);
@@ -385,9 +385,9 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
       captures, {{stage.camera.name, stage.camera.width, stage.camera.height}},
       {{stage.projector.name, stage.projector.width, stage.projector.height}}, stage.board);
   for (const int pose : {6, 7}) stage.capture_bar(plan, pose);
-  SolveCommandOptions options{.captures = captures, .out = out};
+  wizard::SolveCommandOptions options{.captures = captures, .out = out};
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm"};
-  const auto right = solved(options);
+  const auto right = wizard::solved(options);
   ASSERT_TRUE(right.ok()) << right.message();
   ASSERT_EQ(right->scale_bar_lengths.size(), 1U);
   const calib::ScaleBarCheck& check = right->scale_bar_lengths[0];
@@ -404,7 +404,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
                     "charuco:8x6:39mm\", \"known_lengths\": [\"apriltag_36h11:3 apriltag_36h11:7 25cm\"]");
   ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
   options.scale_bar_lengths.clear();
-  const auto wrong = solved(options);
+  const auto wrong = wizard::solved(options);
   ASSERT_TRUE(wrong.ok()) << wrong.message();
   ASSERT_EQ(wrong->scale_bar_lengths.size(), 1U);
   EXPECT_NEAR(wrong->scale_bar_lengths[0].measured_m, 0.250 * 39 / 40, 0.0015);
@@ -416,7 +416,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   EXPECT_NE(wrong->assessment.verdict, calib::Verdict::good);
 
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
-  const auto unseen = solved(options);
+  const auto unseen = wizard::solved(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
   EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::known_length_not_seen);
   for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
@@ -434,7 +434,7 @@ TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
     for (int pose = 0; pose + 1 < 6; ++pose) fs::rename(stripes(pose + 1) / name, stripes(pose) / name);
     fs::rename(captures / "first.png", stripes(5) / name);
   }
-  const auto report = solved({.captures = captures, .out = out});
+  const auto report = wizard::solved({.captures = captures, .out = out});
   if (!report) {
     EXPECT_GT(report.message().size(), 40U);
     EXPECT_FALSE(fs::exists(out / "rig.json"));
@@ -461,12 +461,12 @@ TEST(SolveCommand, SaysThatNoBoardIsVisible) {
 
 TEST(SolveCommand, CallsWrongOptionsWrongUsage) {
   const fs::path folder = test_folder();
-  const auto usage = [](const SolveCommandOptions& options) {
+  const auto usage = [](const wizard::SolveCommandOptions& options) {
     const Status status = run_solve(options);
     return !status.ok() && status.error().wrong_usage;
   };
-  SolveCommandOptions foreign{.captures = folder, .out = folder / "rig"};
-  foreign.import_format = ImportFormat::opencv_gray;
+  wizard::SolveCommandOptions foreign{.captures = folder, .out = folder / "rig"};
+  foreign.import_format = wizard::ImportFormat::opencv_gray;
   EXPECT_TRUE(usage(foreign));
   foreign.projector = "1024x768";
   foreign.board = "chessboard:9x7";

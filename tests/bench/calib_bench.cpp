@@ -52,7 +52,7 @@ std::vector<Case> all_cases() {
 
 // The board as a bent sheet, made of strips across its width.
 sim::Object bowed_board(const TrueRig& truth, const Pose& world_from_board) {
-  sim::Object object = apps::board_object(truth.board, world_from_board);
+  sim::Object object = wizard::board_object(truth.board, world_from_board);
   const scene::Mesh flat = *object.mesh;
   const calib::BoardShape shape{truth.board.width_m(), truth.board.height_m()};
   const Pose board_from_sheet = world_from_board.inverse() * object.world_from_object;

@@ -36,10 +36,10 @@ namespace limn::test {
 namespace {
 
 namespace fs = std::filesystem;
-using apps::Perception;
-using apps::Percepts;
-using apps::Session;
-using apps::SessionSetup;
+using session::Perception;
+using session::Percepts;
+using session::Session;
+using session::SessionSetup;
 
 constexpr double k_lag_s = 0.06;
 
@@ -68,7 +68,7 @@ double mean(const std::vector<double>& values) {
 // The studio, seen by a camera of 1280x1024.
 sim::World studio() {
   sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image).value();
   Imager& camera = world.rig.cameras[0];
   constexpr int k_width = 1280, k_height = 1024;
   camera.lens = Lens::pinhole(1467, 1467, 0.5 * (k_width - 1), 0.5 * (k_height - 1));
@@ -89,9 +89,9 @@ std::vector<Shot> shots(int count, SessionSetup* setup) {
   setup->rig = world.rig;
   setup->scene = *world.scene;
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  apps::Script script;
+  session::Script script;
   script.sways.push_back({"aruco_4x4_50:0", 0, 1e9, {0.05, 0, 0}, 0.5});
-  auto room = apps::ScriptedRoom::create(script, &rig).value();
+  auto room = session::ScriptedRoom::create(script, &rig).value();
   auto perception = Perception::create(setup->scene, setup->rig).value();
   auto session = Session::create(*setup, nullptr, nullptr, false).value();
   std::vector<Shot> out;
@@ -145,8 +145,8 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
   const std::string family = "apriltag_36h11";
   const Peer apriltag = apriltag_peer(std::span(&family, 1), 2, 1);
   auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
-  apps::Latest<std::vector<Frame>> frames;
-  apps::Latest<Percepts> seen;
+  session::Latest<std::vector<Frame>> frames;
+  session::Latest<Percepts> seen;
   std::vector<double> decode, watch, filter, hand, theirs;
   std::size_t markers = 0;
   std::vector<std::function<Frame()>> decoders;
@@ -210,8 +210,8 @@ struct FrameCost {
   double wall_ms = 0, processor_ms = 0;  // in all threads, including the recording's
 };
 FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
-  std::unique_ptr<apps::Recorder> recorder;
-  if (!record.empty()) recorder = apps::Recorder::create(record, setup).value();
+  std::unique_ptr<session::Recorder> recorder;
+  if (!record.empty()) recorder = session::Recorder::create(record, setup).value();
   auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto session = Session::create(setup, nullptr, recorder.get(), false).value();
   std::vector<double> times;

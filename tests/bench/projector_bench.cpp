@@ -169,7 +169,7 @@ int run(int frames) {
     fmt::print(stderr, "{}\n", context.message());
     return 1;
   }
-  auto loaded = sim::load_world(LIMN_SOURCE_DIR "/config/worlds/studio.json", apps::marker_image);
+  auto loaded = sim::load_world(LIMN_SOURCE_DIR "/config/worlds/studio.json", tracker::marker_image);
   if (!loaded) {
     fmt::print(stderr, "{}\n", loaded.message());
     return 1;

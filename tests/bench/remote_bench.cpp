@@ -50,20 +50,21 @@ class Stage {
  public:
   Stage() : context_(device::GlContext::create().value()) {
     sim::World world =
-        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+        sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image)
+            .value();
     static_cast<void>(scale_resolution(k_resolution, &world.rig).ok());
     setup_.rig = world.rig;
     setup_.scene = *world.scene;
     rig_ = std::make_unique<sim::VirtualRig>(
         std::move(world),
         sim::VirtualRigOptions{.frame_period_s = k_period_s, .grab_waits_for_light = false});
-    telemetry_.emplace(apps::Telemetry::create({}).value());
-    perception_.emplace(apps::Perception::create(setup_.scene, setup_.rig).value());
-    session_.emplace(apps::Session::create(setup_, &*telemetry_, nullptr, false).value());
+    telemetry_.emplace(session::Telemetry::create({}).value());
+    perception_.emplace(session::Perception::create(setup_.scene, setup_.rig).value());
+    session_.emplace(session::Session::create(setup_, &*telemetry_, nullptr, false).value());
     health_.add({.name = "camera0", .kind = "camera"});
   }
 
-  const apps::SessionSetup& setup() const { return setup_; }
+  const session::SessionSetup& setup() const { return setup_; }
 
   // Duration of a frame, ms.
   double frame(remote::Server* server) {
@@ -83,12 +84,12 @@ class Stage {
 
  private:
   device::GlContext context_;
-  apps::SessionSetup setup_;
+  session::SessionSetup setup_;
   std::unique_ptr<sim::VirtualRig> rig_;
-  std::optional<apps::Telemetry> telemetry_;
-  std::optional<apps::Perception> perception_;
-  std::optional<apps::Session> session_;
-  apps::DeviceHealth health_;
+  std::optional<session::Telemetry> telemetry_;
+  std::optional<session::Perception> perception_;
+  std::optional<session::Session> session_;
+  session::DeviceHealth health_;
   std::size_t moments_ = 0;
 };
 

@@ -37,8 +37,8 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]\n");
     return 2;
   }
-  limn::apps::SolveCommandOptions options{.captures = argv[1], .out = argv[2]};
-  options.import_format = limn::apps::ImportFormat::opencv_gray;
+  limn::wizard::SolveCommandOptions options{.captures = argv[1], .out = argv[2]};
+  options.import_format = limn::wizard::ImportFormat::opencv_gray;
   options.projector = "1024x768";
   options.board = "chessboard:9x7:75mm";
   options.poses = "capture_*";
@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
                        }));
     if (empty > 0) return 1;
     solving = std::min(solving, seconds_of([&] {
-                         const auto report = limn::apps::solved(options);
+                         const auto report = limn::wizard::solved(options);
                          if (!report) return fmt::print(stderr, "{}\n", report.message());
                          held_out = report->assessment.held_out.rms_px;
                          worst = report->assessment.held_out.worst_px;

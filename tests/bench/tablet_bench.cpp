@@ -56,21 +56,21 @@ double processor_ms() {
 // A session in the studio, with light on its door.
 struct Room {
   device::GlContext context = device::GlContext::create().value();
-  apps::SessionSetup setup;
+  session::SessionSetup setup;
   sim::VirtualRig rig;
-  apps::Perception perception;
-  apps::Session session;
+  session::Perception perception;
+  session::Session session;
   std::size_t moments = 0;
 
   explicit Room(const sim::World& world)
       : setup{.rig = world.rig, .scene = *world.scene, .watch = {}, .paint = {}},
         rig(world, {.grab_waits_for_light = false}),
-        perception(apps::Perception::create(setup.scene, setup.rig).value()),
-        session(apps::Session::create(setup, nullptr, nullptr, false).value()) {
+        perception(session::Perception::create(setup.scene, setup.rig).value()),
+        session(session::Session::create(setup, nullptr, nullptr, false).value()) {
     for (int i = 0; i < 6; ++i) step();
   }
 
-  const apps::Percepts& see() {
+  const session::Percepts& see() {
     const int camera = 0;
     ++moments;
     return perception.watch(rig.expose(std::span(&camera, 1)));
@@ -78,7 +78,7 @@ struct Room {
 
   void step() {
     session.update_percepts(see(), moments);
-    const apps::ComposedFrame& painted = session.compose_and_record(rig.now(), shifted(rig.now(), 0.04));
+    const session::ComposedFrame& painted = session.compose_and_record(rig.now(), shifted(rig.now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig.projector(static_cast<int>(k)).show(painted.projectors[k]).value();
   }
@@ -139,7 +139,7 @@ void print_window(const std::vector<TabletShot>& shots, Room* room, remote::Tabl
   json last;
   constexpr const char* k_parts[] = {"decode", "track", "composite", "encode"};
   // As in a session, each image has different tracks.
-  std::vector<apps::Percepts> moments;
+  std::vector<session::Percepts> moments;
   for (std::size_t i = 0; i < shots.size(); ++i) moments.push_back(room->see());
   for (int round = 0; round < 3; ++round) {
     for (std::size_t i = 0; i < shots.size(); ++i) {
@@ -247,7 +247,7 @@ int main(int argc, char** argv) {
       return 2;
     }
   const sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image).value();
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image).value();
   Room room(world);
   VirtualTablet tablet(world, room.session.composed().projectors, k_width, k_height, seed);
   std::vector<TabletShot> shots;

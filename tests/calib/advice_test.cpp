@@ -106,8 +106,9 @@ TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
   EXPECT_EQ(words.rfind("usable: predicted error 1.40 mm on projector1", 0), 0U) << words;
   EXPECT_NE(words.find("(pose7) 0.61 px"), std::string::npos) << words;
   EXPECT_NE(words.find("the predicted error is above 1 mm, the limit of good"), std::string::npos) << words;
-  judged.assessment.faults = {
-      {"odd_pose", "pose03", ""}, {"odd_pose", "pose04", ""}, {"bent_board", "bent", "flatten it"}};
+  judged.assessment.faults = {{FaultName::odd_pose, "pose03", ""},
+                              {FaultName::odd_pose, "pose04", ""},
+                              {FaultName::bent_board, "bent", "flatten it"}};
   EXPECT_NE(judged.words().verdict.find("faults were found: odd_pose and bent_board"), std::string::npos)
       << judged.words().verdict;
   judged.assessment.predicted_error_mm = {0.8, 0.9};

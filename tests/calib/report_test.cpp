@@ -44,7 +44,7 @@ World noisy_world() {
 
 TEST(Report, ThePageIsSelfContainedAndSaysTheVerdictInWords) {
   Report report = reported(noisy_world(), test_folder(), "2026-11-21T10:00:00Z");
-  report.assessment.faults = {{"odd <fault>", "a & b", "look \"here\""}};
+  report.assessment.faults = {{FaultName::odd_pose, "odd <fault>, a & b", "look \"here\""}};
   report.lens_trials = {
       {"camera0", "LENSMODEL_OPENCV8", std::numeric_limits<double>::quiet_NaN(), 0, 0, false}};
   const std::string html = report_html(report);

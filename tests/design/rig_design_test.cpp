@@ -10,7 +10,7 @@
 #include "design/design_report.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 namespace fs = std::filesystem;
@@ -59,7 +59,7 @@ TEST(Foresee, TheExamplesLoadAndTheNumbersRepeat) {
 TEST(Foresee, APageShowsTheRig) {
   const fs::path out = test::test_folder() / "plan";
   testing::internal::CaptureStdout();
-  const Status done = run_plan_rig({.described = k_described / "bench.json", .out = out});
+  const Status done = apps::run_plan_rig({.described = k_described / "bench.json", .out = out});
   const std::string table = testing::internal::GetCapturedStdout();
   ASSERT_TRUE(done.ok()) << done.message();
   const std::string page = read_file(out / "plan.html").value();
@@ -166,4 +166,4 @@ TEST(Foresee, WrongFilesAreNamedByKey) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -18,7 +18,7 @@
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
 
-namespace limn::apps {
+namespace limn::design {
 namespace {
 
 namespace fs = std::filesystem;
@@ -54,13 +54,13 @@ void check_rig(DescribedRig described,
                bool own_noise,
                const fs::path& out) {
   testing::internal::CaptureStdout();
-  const Status calibrated = run_calibrate({.plan = plan, .out = out, .all = true});
+  const Status calibrated = apps::run_calibrate({.plan = plan, .out = out, .all = true});
   testing::internal::GetCapturedStdout();
   ASSERT_TRUE(calibrated.ok()) << calibrated.message();
   const json report = test::read_json(out / "report.json");
   const auto rig = load_rig(out);
   ASSERT_TRUE(rig) << rig.message();
-  const auto world = sim::load_world(world_file, marker_image);
+  const auto world = sim::load_world(world_file, tracker::marker_image);
   ASSERT_TRUE(world) << world.message();
   if (!own_noise) {
     described.corner_px = report["devices"][0]["rms_px"].get<double>() / std::sqrt(2.0);
@@ -122,4 +122,4 @@ TEST(ForeseeTruth, ARigOfTheExamplesComesOutAsForeseen) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::design

@@ -4,7 +4,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/text.h"
 
-namespace limn::apps {
+namespace limn::device {
 namespace {
 
 namespace fs = std::filesystem;
@@ -112,4 +112,4 @@ TEST(Devices, OfAnotherRigAreRefusedAndNamed) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::device

@@ -26,7 +26,7 @@
 #include "scene/scene.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 using Eigen::Vector2d;
@@ -89,7 +89,7 @@ class ExportDoor : public testing::Test {
 };
 
 TEST_F(ExportDoor, ComesBackWithItsPointsSharesAndProjectors) {
-  const Status status = run_export(options);
+  const Status status = apps::run_export(options);
   ASSERT_TRUE(status) << status.message();
   const auto mpcdi = read_mpcdi(options.mpcdi);
   ASSERT_TRUE(mpcdi) << mpcdi.message();
@@ -131,8 +131,8 @@ TEST_F(ExportDoor, ComesBackWithItsPointsSharesAndProjectors) {
     }
     EXPECT_GT(lit, 5000);
   }
-  ImportOptions import{options.mpcdi, folder / "back"};
-  ASSERT_TRUE(run_import(import));
+  apps::ImportOptions import{options.mpcdi, folder / "back"};
+  ASSERT_TRUE(apps::run_import(import));
   EXPECT_EQ(load_rig(folder / "back")->projectors.size(), 2u);
 }
 
@@ -145,7 +145,7 @@ TEST_F(ExportDoor, GivesPlacesInTheViewersImage) {
   ASSERT_TRUE(write_file(
       options.viewer,
       json{{"world_from_viewer", to_json(world_from_viewer)}, {"size", {400, 200}}, {"fov_deg", 20}}.dump()));
-  const Status status = run_export(options);
+  const Status status = apps::run_export(options);
   ASSERT_TRUE(status) << status.message();
   const Mpcdi mpcdi = read_mpcdi(options.mpcdi).value();
   const MpcdiRegion& region = mpcdi.regions[1];
@@ -182,7 +182,7 @@ TEST_F(ExportDoor, WritesWarpsAsPfmAndExr) {
   for (const WarpFormat format : {WarpFormat::pfm, WarpFormat::exr}) {
     options.format = format;
     options.warp = folder / "warps";
-    ASSERT_TRUE(run_export(options));
+    ASSERT_TRUE(apps::run_export(options));
   }
   EXPECT_EQ(files_in(options.warp), (std::vector<std::string>{"warp-projector0.exr", "warp-projector0.pfm",
                                                               "warp-projector1.exr", "warp-projector1.pfm"}));
@@ -208,7 +208,7 @@ TEST_F(ExportDoor, WritesWarpsAsPfmAndExr) {
 TEST_F(ExportDoor, WritesEachLookAsTheViewerSeesIt) {
   options.mpcdi.clear();
   options.looks = folder / "looks";
-  const Status status = run_export(options);
+  const Status status = apps::run_export(options);
   ASSERT_TRUE(status) << status.message();
   const scene::Scene scene = scene::load_scene(options.scene).value();
   const auto& variants = scene.find_slot("mirror")->variants;
@@ -228,20 +228,20 @@ TEST_F(ExportDoor, LeavesNothingBehindWhereItCannotWrite) {
   ASSERT_TRUE(make_folder(folder / "there"));
   ASSERT_TRUE(make_folder(folder / "there" / "door.mpcdi"));  // a folder of the file's name
   options.mpcdi = folder / "there" / "door.mpcdi";
-  Status status = run_export(options);
+  Status status = apps::run_export(options);
   ASSERT_FALSE(status);
   EXPECT_NE(status.message().find("door.mpcdi"), std::string::npos) << status.message();
   EXPECT_FALSE(status.error().wrong_usage);
   EXPECT_EQ(files_in(folder / "there"), std::vector<std::string>{"door.mpcdi"});
   EXPECT_TRUE(files_in(options.mpcdi).empty());
   options.mpcdi = folder / "nowhere" / "door.mpcdi";
-  EXPECT_FALSE(run_export(options));
+  EXPECT_FALSE(apps::run_export(options));
   EXPECT_FALSE(fs::exists(folder / "nowhere"));
 }
 
 TEST_F(ExportDoor, MistakesAreErrors) {
   const auto failed = [](const ExportOptions& wrong, bool usage, const std::string& says) {
-    const Status status = run_export(wrong);
+    const Status status = apps::run_export(wrong);
     ASSERT_FALSE(status) << says;
     EXPECT_NE(status.message().find(says), std::string::npos) << status.message();
     EXPECT_EQ(status.error().wrong_usage, usage) << status.message();
@@ -320,7 +320,7 @@ TEST(ExportSheet, SharesSumToOneAndBetaEvensBlack) {
   options.scene = folder / "scene";
   options.poses = folder / "poses.json";
   options.mpcdi = folder / "sheet.mpcdi";
-  const Status status = run_export(options);
+  const Status status = apps::run_export(options);
   ASSERT_TRUE(status) << status.message();
   const Mpcdi mpcdi = read_mpcdi(options.mpcdi).value();
   EXPECT_EQ(mpcdi.colour_level, 2);
@@ -403,8 +403,8 @@ TEST(Import, TakesProjectorsInChristiesForm) {
   ASSERT_EQ(mpcdi.remarks.size(), 1u);
   EXPECT_NE(mpcdi.remarks[0].find("Projector 3"), std::string::npos);
 
-  ImportOptions options{folder / "head.mpcdi.xml", folder / "rig"};
-  const Status status = run_import(options);
+  apps::ImportOptions options{folder / "head.mpcdi.xml", folder / "rig"};
+  const Status status = apps::run_import(options);
   ASSERT_TRUE(status) << status.message();
   const Rig rig = load_rig(folder / "rig").value();
   ASSERT_EQ(rig.projectors.size(), 2u);
@@ -427,7 +427,7 @@ TEST(Import, TakesProjectorsInChristiesForm) {
 
   testing::internal::CaptureStdout();
   options.json = true;
-  ASSERT_TRUE(run_import(options));
+  ASSERT_TRUE(apps::run_import(options));
   const json report = json::parse(testing::internal::GetCapturedStdout());
   EXPECT_EQ(report["regions"][1]["id"], "Projector 2");
   EXPECT_EQ(report["regions"][1]["frustum_deg"]["pitch"], -45);
@@ -452,7 +452,7 @@ TEST(Import, KeepsDevicesInsideTheRigFolder) {
   xml = std::regex_replace(xml, std::regex("Projector 2"), ".._.._P");
   ASSERT_TRUE(make_folder(folder / "a/b"));
   ASSERT_TRUE(write_file(folder / "head.mpcdi.xml", xml));
-  ASSERT_TRUE(run_import({folder / "head.mpcdi.xml", folder / "a/b/rig"}));
+  ASSERT_TRUE(apps::run_import({folder / "head.mpcdi.xml", folder / "a/b/rig"}));
   EXPECT_EQ(files_in(folder), (std::vector<std::string>{"a", "head.mpcdi.xml"}));
   EXPECT_EQ(files_in(folder / "a"), std::vector<std::string>{"b"});
   EXPECT_EQ(load_rig(folder / "a/b/rig")->projectors[1].name, ".._.._P_");
@@ -658,4 +658,4 @@ TEST(Import, UnpacksNoBomb) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::exchange

@@ -14,7 +14,7 @@
 #include "scene/mesh.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 namespace fs = std::filesystem;
@@ -30,10 +30,10 @@ struct Printed {
 
 // Reads what `limn markers --mount` wrote, byte by byte.
 Printed printed(double size_mm) {
-  MarkersOptions options;
+  apps::MarkersOptions options;
   options.size_mm = size_mm;
   options.mount = test::test_folder() / fmt::format("holder-{:g}.stl", size_mm);
-  const Status status = run_markers(options);
+  const Status status = apps::run_markers(options);
   EXPECT_TRUE(status) << status.message();
   Printed found;
   found.stl = options.mount;
@@ -156,17 +156,17 @@ TEST(MarkerMount, IsReadBackAsAMesh) {
 }
 
 TEST(MarkerMount, WritesASheetBesideAndTellsWrongUsage) {
-  MarkersOptions good;
+  apps::MarkersOptions good;
   const fs::path folder = test::test_folder();
   good.mount = folder / "a.stl";
   good.out = folder / "a.pdf";
-  ASSERT_TRUE(run_markers(good));
+  ASSERT_TRUE(apps::run_markers(good));
   EXPECT_TRUE(fs::exists(good.out));
-  const auto is_wrong = [](MarkersOptions options, const std::string& what) {
-    const Status status = run_markers(options);
+  const auto is_wrong = [](apps::MarkersOptions options, const std::string& what) {
+    const Status status = apps::run_markers(options);
     return !status && status.error().wrong_usage && status.message().find(what) != std::string::npos;
   };
-  MarkersOptions bad = good;
+  apps::MarkersOptions bad = good;
   bad.size_mm = 200;
   EXPECT_TRUE(is_wrong(bad, "--size-mm"));
   bad = good;
@@ -181,4 +181,4 @@ TEST(MarkerMount, WritesASheetBesideAndTellsWrongUsage) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::exchange

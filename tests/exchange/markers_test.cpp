@@ -16,7 +16,7 @@
 #include "tests/tracker/marker_images.h"
 #include "tracker/detector.h"
 
-namespace limn::apps {
+namespace limn::exchange {
 namespace {
 
 // Draws a printed sheet of 40 mm markers at 5 px per mm and detects its markers: these ids, upright, in true
@@ -25,11 +25,11 @@ void expect_printed(const std::string& family,
                     const std::string& ids,
                     const std::set<std::string>& expected) {
   const auto folder = test::test_folder();
-  MarkersOptions options;
+  apps::MarkersOptions options;
   options.family = family;
   options.ids = ids;
   options.out = folder / "sheet.pdf";
-  ASSERT_TRUE(run_markers(options));
+  ASSERT_TRUE(apps::run_markers(options));
   EXPECT_EQ(read_file(options.out).value().rfind("%PDF", 0), 0u);
   const std::string render =
       "pdftoppm -r 127 -png '" + options.out.string() + "' '" + (folder / "page").string() + "'";
@@ -56,39 +56,39 @@ TEST(Markers, PrintedBarcodesAreFound) {
 }
 
 TEST(Markers, DrawSvgPages) {
-  MarkersOptions options;
+  apps::MarkersOptions options;
   options.ids = "0-30";
   options.out = test::test_folder() / "sheet.svg";
-  ASSERT_TRUE(run_markers(options));
+  ASSERT_TRUE(apps::run_markers(options));
   EXPECT_TRUE(read_file(options.out));
   EXPECT_TRUE(read_file(options.out.parent_path() / "sheet-2.svg"));
 }
 
 TEST(Markers, DrawABoardWithItsScale) {
-  MarkersOptions options;
+  apps::MarkersOptions options;
   options.board = "chessboard:9x7:20mm";
   for (const char* name : {"board.pdf", "board.png", "board.svg"}) {
     options.out = test::test_folder() / name;
-    const Status status = run_markers(options);
+    const Status status = apps::run_markers(options);
     EXPECT_TRUE(status) << status.message();
   }
 }
 
 TEST(Markers, TellWrongUsage) {
   const auto folder = test::test_folder();
-  const auto wrong = [&](const MarkersOptions& options) {
-    const Status status = run_markers(options);
+  const auto wrong = [&](const apps::MarkersOptions& options) {
+    const Status status = apps::run_markers(options);
     return !status && status.error().wrong_usage;
   };
-  MarkersOptions good;
+  apps::MarkersOptions good;
   good.out = folder / "a.pdf";
-  ASSERT_TRUE(run_markers(good));
+  ASSERT_TRUE(apps::run_markers(good));
   for (const char* ids : {"", "a", "3-1", "1,,2", "99"}) {
-    MarkersOptions bad = good;
+    apps::MarkersOptions bad = good;
     bad.ids = ids;
     EXPECT_TRUE(wrong(bad)) << ids;
   }
-  MarkersOptions bad = good;
+  apps::MarkersOptions bad = good;
   bad.size_mm = 500;
   EXPECT_TRUE(wrong(bad));
   bad = good;
@@ -112,7 +112,7 @@ TEST(Markers, LearnABodyFromItsImages) {
                                                 Pose(exp_rotation({0, 0, -0.4}), {0.05, -0.05, 0}),
                                                 Pose(exp_rotation({0.5, 0, 0}), {-0.05, 0.05, -0.01}),
                                                 Pose(exp_rotation({0, 0.3, 1}), {0.05, 0.05, 0.005})};
-  LearnBodyOptions options;
+  apps::LearnBodyOptions options;
   options.camera = folder / "camera0.cameramodel";
   options.family = "aruco_4x4_50";
   options.size_mm = 50;
@@ -129,7 +129,7 @@ TEST(Markers, LearnABodyFromItsImages) {
         write_png(options.images.back(), test::image_of(camera.lens, test::plain(800, 600, 100), markers,
                                                         {.blur_px = 0.6, .noise_levels = 2}, rng)));
   }
-  const Status status = run_learn_body(options);
+  const Status status = apps::run_learn_body(options);
   ASSERT_TRUE(status) << status.message();
   const auto body = test::read_json(options.out);
   EXPECT_EQ(body["schema"], "limn.body/1");
@@ -146,13 +146,13 @@ TEST(Markers, LearnABodyFromItsImages) {
     EXPECT_LT(found[i].at("stddev_mm").numbers(3)[2], 0.3);
   }
   const std::string before = read_file(options.out).value();
-  ASSERT_TRUE(run_learn_body(options));
+  ASSERT_TRUE(apps::run_learn_body(options));
   EXPECT_EQ(read_file(options.out).value(), before);
   options.images.resize(1);
   options.family = "apriltag_36h11";
-  EXPECT_NE(run_learn_body(options).message().find("two or more markers"), std::string::npos);
+  EXPECT_NE(apps::run_learn_body(options).message().find("two or more markers"), std::string::npos);
   options.camera.clear();
-  EXPECT_TRUE(run_learn_body(options).error().wrong_usage);
+  EXPECT_TRUE(apps::run_learn_body(options).error().wrong_usage);
 }
 
 TEST(Markers, TrainedTemplatesAreComparedWithOthers) {
@@ -162,23 +162,23 @@ TEST(Markers, TrainedTemplatesAreComparedWithOthers) {
   image(cv::Rect(150, 150, 100, 100)).setTo(cv::Scalar(200, 220, 240));
   image(cv::Rect(150, 150, 40, 70)).setTo(cv::Scalar(20, 20, 20));
   ASSERT_TRUE(write_png(folder / "photo.png", image));
-  MarkersOptions train;
+  apps::MarkersOptions train;
   train.train = folder / "photo.png";
   train.out = folder / "new.patt";
-  const Status trained = run_markers(train);
+  const Status trained = apps::run_markers(train);
   ASSERT_TRUE(trained) << trained.message();
   ASSERT_TRUE(write_file(folder / "copy.patt", read_file(train.out).value()));
-  MarkersOptions compare;
+  apps::MarkersOptions compare;
   compare.compare = {folder / "new.patt", folder / "copy.patt"};
   compare.json = folder / "pairs.json";
-  const Status compared = run_markers(compare);
+  const Status compared = apps::run_markers(compare);
   ASSERT_TRUE(compared) << compared.message();
   const std::string json = read_file(compare.json).value();
   EXPECT_NE(json.find("\"verdict\": \"confused\""), std::string::npos) << json;
   train.out = folder / "new.txt";
-  const Status wrong = run_markers(train);
+  const Status wrong = apps::run_markers(train);
   EXPECT_TRUE(!wrong && wrong.error().wrong_usage);
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::exchange

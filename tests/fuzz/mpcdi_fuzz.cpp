@@ -11,33 +11,33 @@ using namespace limn;
 void check(const std::string& bytes) {
   const auto file =
       test::fuzzed_file(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size(), "head.mpcdi");
-  const auto mpcdi = apps::read_mpcdi(file);
+  const auto mpcdi = exchange::read_mpcdi(file);
   if (!mpcdi) {
     test::check_message(mpcdi.message(), file);
     return;
   }
   LIMN_CHECK(!mpcdi->regions.empty());
-  for (const apps::MpcdiRegion& region : mpcdi->regions) {
+  for (const exchange::MpcdiRegion& region : mpcdi->regions) {
     const cv::Size size(region.width, region.height);
     LIMN_CHECK(!region.id.empty() && region.width > 0 && region.height > 0);
     LIMN_CHECK(region.warp.empty() || (region.warp.type() == CV_32FC3 && region.warp.cols <= region.width &&
                                        region.warp.rows <= region.height));
     for (const auto* map : {&region.alpha, &region.beta})
       LIMN_CHECK(!*map || ((*map)->image.size() == size && (*map)->gamma_embedded > 0));
-    if (const auto imager = apps::imager_of(region)) test::check_imager(*imager);
+    if (const auto imager = exchange::imager_of(region)) test::check_imager(*imager);
   }
 }
 
 std::string packed(const std::string& text) {
   constexpr const char* k_line = "\n%%\n";
-  std::vector<apps::ZipFile> files;
+  std::vector<exchange::ZipFile> files;
   for (std::size_t at = 0; at <= text.size();) {
     const std::size_t end = std::min(text.find(k_line, at), text.size());
     const std::string name = files.empty() ? "mpcdi.xml" : std::to_string(files.size());
     files.push_back({name, text.substr(at, end - at), true});
     at = end + 4;
   }
-  return apps::zipped(files).value();
+  return exchange::zipped(files).value();
 }
 
 }  // namespace

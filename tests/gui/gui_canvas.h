@@ -24,7 +24,7 @@ class GuiCanvas {
     glTextureStorage2D(texture_, 1, GL_RGBA8, size.width, size.height);
     glCreateFramebuffers(1, &framebuffer_);
     glNamedFramebufferTexture(framebuffer_, GL_COLOR_ATTACHMENT0, texture_, 0);
-    gui_ = std::make_unique<apps::Gui>(1.F);
+    gui_ = std::make_unique<gui::Gui>(1.F);
   }
   ~GuiCanvas() {
     gui_.reset();
@@ -32,13 +32,13 @@ class GuiCanvas {
     glDeleteTextures(1, &texture_);
   }
 
-  void draw(const std::function<void(apps::Gui&)>& widgets, const device::WindowInput& input = {}) {
+  void draw(const std::function<void(gui::Gui&)>& widgets, const device::WindowInput& input = {}) {
     glBindFramebuffer(GL_FRAMEBUFFER, framebuffer_);
     gui_->frame(size_, 1 / 30.0, input, [&] { widgets(*gui_); });
   }
 
   /// A click of the left button: there, pressed, let go; `widgets` is called for each.
-  void click(cv::Point2f at, const std::function<void(apps::Gui&)>& widgets) {
+  void click(cv::Point2f at, const std::function<void(gui::Gui&)>& widgets) {
     for (const bool held : {false, true, false})
       draw(widgets, {.pointer = at, .buttons = {held, false, false}});
   }
@@ -62,7 +62,7 @@ class GuiCanvas {
   cv::Size size_;
   device::GlContext context_;
   GLuint texture_ = 0, framebuffer_ = 0;
-  std::unique_ptr<apps::Gui> gui_;
+  std::unique_ptr<gui::Gui> gui_;
 };
 
 }  // namespace limn::test

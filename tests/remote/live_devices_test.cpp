@@ -79,22 +79,22 @@ class LooseCamera : public device::CameraSource {
 };
 
 TEST(Latest, TheNewestWinsAndNothingQueues) {
-  apps::Latest<int> box;
-  EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
+  session::Latest<int> box;
+  EXPECT_FALSE(box.take_newest(std::chrono::milliseconds(1)));
   std::thread writer([&] {
     for (int i = 1; i <= 1000; ++i) box.put(i);
   });
   writer.join();
-  EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 1000);
-  EXPECT_FALSE(box.take(std::chrono::milliseconds(1)));
+  EXPECT_EQ(box.take_newest(std::chrono::milliseconds(1)), 1000);
+  EXPECT_FALSE(box.take_newest(std::chrono::milliseconds(1)));
   box.put(3);
   box.put(4, [](const int& old, int& next) { next += old; });
-  EXPECT_EQ(box.take(std::chrono::milliseconds(1)), 7);
+  EXPECT_EQ(box.take_newest(std::chrono::milliseconds(1)), 7);
 }
 
 TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
   const Stamp begun = shifted(Stamp{}, 5000);
-  apps::SourceClock own;  // the session's clock, 30 ms on the way
+  session::SourceClock own;  // the session's clock, 30 ms on the way
   for (int i = 0; i < 5; ++i) {
     const Stamp now = shifted(begun, 0.1 * i);
     const auto time = own.on_session_clock(shifted(now, -0.03), now);
@@ -110,7 +110,7 @@ TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
     EXPECT_FALSE(next.has_stepped);
     EXPECT_NEAR(seconds_between(next.captured_at, shifted(begun, 1.1)), 0.03, 1e-6);
   }
-  apps::SourceClock video;
+  session::SourceClock video;
   EXPECT_EQ(video.on_session_clock(Stamp{}, begun).captured_at, begun);
   EXPECT_TRUE(video.is_other());
 }
@@ -133,11 +133,11 @@ class StuckCamera : public device::CameraSource {
 
 TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
   std::promise<void> freed;
-  auto health = std::make_shared<apps::DeviceHealth>();
+  auto health = std::make_shared<session::DeviceHealth>();
   const std::size_t number = health->add({"camera0", "camera"});
-  auto threads = std::make_unique<apps::CameraThreads>(health);
+  auto threads = std::make_unique<session::CameraThreads>(health);
   threads->add(std::make_unique<StuckCamera>(freed.get_future().share()), number);
-  EXPECT_FALSE(threads->take(std::chrono::milliseconds(10)).has_value());
+  EXPECT_FALSE(threads->take_frames(std::chrono::milliseconds(10)).has_value());
   const auto begun = std::chrono::steady_clock::now();
   testing::internal::CaptureStderr();
   threads.reset();
@@ -153,7 +153,7 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
 TEST(Recorder, AFrameIsReadAsItWasWatched) {
   const fs::path folder = test::test_folder();
   const sim::World world = test::studio_world();
-  apps::SessionSetup setup;
+  session::SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
   cv::Mat colours(48, 64, CV_8UC3);
@@ -162,18 +162,18 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
   Frame sent = device::decode_frame({jpeg.begin(), jpeg.end()}).value();
   sent.camera = "camera0";
   const Frame taken{"camera0", colours, {}};
-  auto recorder = apps::Recorder::create(folder / "recording", setup).value();
+  auto recorder = session::Recorder::create(folder / "recording", setup).value();
   recorder->record_frames(std::vector{sent, taken});
   ASSERT_TRUE(recorder->finish().ok());
-  const auto first = apps::load_frame(folder / "recording/frames/camera0/000000.jpg");
+  const auto first = session::load_frame(folder / "recording/frames/camera0/000000.jpg");
   ASSERT_TRUE(first) << first.message();
   EXPECT_TRUE(test::image_near(first->image, sent.image, 0, 0, "image"));
   EXPECT_TRUE(test::image_near(first->grey, sent.grey, 0, 0, "brightness"));
   EXPECT_GT(cv::norm(first->grey, to_grey(sent.image), cv::NORM_INF), 0);
-  const auto second = apps::load_frame(folder / "recording/frames/camera0/000001.png");
+  const auto second = session::load_frame(folder / "recording/frames/camera0/000001.png");
   ASSERT_TRUE(second) << second.message();
   EXPECT_TRUE(test::image_near(second->image, colours, 0, 0, "picture"));
-  EXPECT_FALSE(apps::load_frame(folder / "recording/frames/camera0/000002.jpg"));
+  EXPECT_FALSE(session::load_frame(folder / "recording/frames/camera0/000002.jpg"));
 }
 
 // Threads as of a real rig, on stored images of the studio at their pace; a recording of it replays as the
@@ -181,7 +181,7 @@ TEST(Recorder, AFrameIsReadAsItWasWatched) {
 TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
   const fs::path folder = test::test_folder();
   sim::World world = test::studio_world(0.5);
-  apps::SessionSetup setup;
+  session::SessionSetup setup;
   setup.rig = world.rig;
   setup.scene = *world.scene;
   sim::VirtualRig room(std::move(world), {.grab_waits_for_light = false});
@@ -191,13 +191,13 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto output = apps::SessionOutput::open(folder / "out", folder / "recording", &setup);
+  auto output = session::SessionOutput::open(folder / "out", folder / "recording", &setup);
   ASSERT_TRUE(output) << output.message();
-  auto perception = apps::Perception::create(setup.scene, setup.rig, setup.watch);
+  auto perception = session::Perception::create(setup.scene, setup.rig, setup.watch);
   ASSERT_TRUE(perception) << perception.message();
-  auto session = apps::Session::create(setup, &output->telemetry(), output->recorder());
+  auto session = session::Session::create(setup, &output->telemetry(), output->recorder());
   ASSERT_TRUE(session) << session.message();
-  apps::SessionDevices devices;
+  session::SessionDevices devices;
   devices.cameras.push_back(std::make_unique<LooseCamera>(
       device::ImageSequenceCamera::open(folder / "pictures", {.frames_per_second = 20, .repeat = true})
           .value(),
@@ -217,7 +217,7 @@ TEST(LiveDevices, PlaysRecordsAndEndsInTime) {
 
   const std::atomic<bool> is_ended = false;
   const auto begun = std::chrono::steady_clock::now();
-  const Status played = apps::play_on_devices(&devices, 2.5, is_ended, {*perception, *session, *output});
+  const Status played = session::play_on_devices(&devices, 2.5, is_ended, {*perception, *session, *output});
   const double took_s = seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(played.ok()) << played.message();
   EXPECT_LT(took_s, 2.5 + 1 + 1.5);  // its end, and an image that was being painted on a slow machine
@@ -288,16 +288,16 @@ struct Repair {
   Rig before, after;
   Pose camera_from_world, world_from_prototype;  // true
   double repair_s = 0, longest_edit_s = 0;
-  std::set<std::string> told;  // progress, as guests were told
+  std::set<std::string> progress;  // texts that guests received
   std::string progress_at_end;
-  apps::ComposedFrame composed;
+  session::ComposedFrame composed;
 };
 
 // The nudged camera is found by the session's own devices, whose threads go on with the mended rig.
 void play_a_repair(Repair* repair) {
   const fs::path folder = repair->folder = test::test_folder();
   sim::World world = test::studio_world(0.5);
-  apps::SessionSetup setup;
+  session::SessionSetup setup;
   setup.rig = world.rig;
   setup.rig.provenance_json = R"({"display_latency_ms": {"projector0": 0, "projector1": 0}})";
   setup.scene = *world.scene;
@@ -308,12 +308,12 @@ void play_a_repair(Repair* repair) {
                   {}};
   const auto context = device::GlContext::create();
   ASSERT_TRUE(context) << context.message();
-  auto output = apps::SessionOutput::open(folder / "out", folder / "recording", &setup);
+  auto output = session::SessionOutput::open(folder / "out", folder / "recording", &setup);
   ASSERT_TRUE(output) << output.message();
-  auto perception = apps::Perception::create(setup.scene, setup.rig, setup.watch);
-  auto session = apps::Session::create(setup, &output->telemetry(), output->recorder());
+  auto perception = session::Perception::create(setup.scene, setup.rig, setup.watch);
+  auto session = session::Session::create(setup, &output->telemetry(), output->recorder());
   ASSERT_TRUE(perception && session);
-  apps::SessionDevices devices;
+  session::SessionDevices devices;
   devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
   for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
   // Meanwhile guests are answered, and progress how far it is.
@@ -334,7 +334,7 @@ void play_a_repair(Repair* repair) {
       (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
       longest_s = std::max(longest_s, seconds_between(requested_at, std::chrono::steady_clock::now()));
       const std::string state = test::RemoteClient(server->port()).get("/api/state", token).body;
-      repair->told.insert(nlohmann::json::parse(state)["repair"]);
+      repair->progress.insert(nlohmann::json::parse(state)["repair"]);
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     repair->repair_s = seconds_between(begun, std::chrono::steady_clock::now());
@@ -342,7 +342,7 @@ void play_a_repair(Repair* repair) {
     is_ended = true;
   });
   const Status played =
-      apps::play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
+      session::play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
   guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
   ASSERT_TRUE(output->close(&*session, false).ok());
@@ -363,7 +363,7 @@ class RunningRepair : public testing::Test {
 
 TEST_F(RunningRepair, GuestsAreAnsweredMeanwhileAndToldHowFarItIs) {
   const double longest_s = repair_->longest_edit_s, repair_s = repair_->repair_s;
-  const std::set<std::string>& told = repair_->told;
+  const std::set<std::string>& progress = repair_->progress;
   std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
   EXPECT_LT(longest_s, 0.4 * repair_s) << "a picture that is painted, and a painter for the mended rig";
   EXPECT_TRUE(progress.contains("computing"));
@@ -376,7 +376,7 @@ TEST_F(RunningRepair, GuestsAreAnsweredMeanwhileAndToldHowFarItIs) {
 TEST_F(RunningRepair, TheSessionGoesOnWithTheMendedRig) {
   EXPECT_TRUE(test::pose_near(repair_->after.cameras[0].imager_from_world, repair_->camera_from_world,
                               0.02 * M_PI / 180, 0.0015));
-  const apps::ComposedFrame& painted = repair_->composed;
+  const session::ComposedFrame& painted = repair_->composed;
   ASSERT_TRUE(painted.posed.world_from_prototype);
   EXPECT_TRUE(
       test::pose_near(*painted.posed.world_from_prototype, repair_->world_from_prototype, 0.2_deg, 1.5_mm));
@@ -394,9 +394,9 @@ TEST_F(RunningRepair, ItsRecordingReplays) {
 TEST_F(RunningRepair, WhateverItIsAtItEndsInTime) {
   for (const bool is_computing : {false, true}) {
     std::vector<fs::path> shown;
-    auto repair = std::make_unique<apps::LiveRecalibration>(
+    auto repair = std::make_unique<session::LiveRecalibration>(
         repair_->before, repair_->folder / fmt::format("ended-{}", is_computing), [&](ImageWriter* writer) {
-          apps::WizardBackend backend;
+          wizard::WizardBackend backend;
           backend.capture.show = [&](int projector, const cv::Mat&) -> Status {
             const fs::path images =
                 repair_->folder /
@@ -427,8 +427,8 @@ TEST_F(RunningRepair, WhateverItIsAtItEndsInTime) {
 }
 
 TEST(LiveDevices, SaysWhatIsMissing) {
-  apps::SessionDevices devices;
-  const Status checked = apps::check_devices(devices);
+  session::SessionDevices devices;
+  const Status checked = session::check_devices(devices);
   ASSERT_FALSE(checked.ok());
   EXPECT_NE(checked.message().find("a camera that works"), std::string::npos);
 }

@@ -26,7 +26,7 @@ const std::string k_text = "https://192.168.107.12:8443/#pin=123456";
 
 // The share of a code's modules that a camera sees otherwise than they are, where it sees the sign's corners.
 double misread(const cv::Mat& seen, const cv::Mat& sign, const std::array<cv::Point2f, 4>& corners) {
-  const cv::Mat code = apps::qr_code(k_text);
+  const cv::Mat code = gui::qr_code(k_text);
   const float width = static_cast<float>(code.cols),
               height = width * static_cast<float>(sign.rows) / static_cast<float>(sign.cols);
   const std::array<cv::Point2f, 4> from = {{{0, 0}, {width, 0}, {width, height}, {0, height}}};
@@ -54,9 +54,9 @@ TEST(CodeSign, IsReadOnThePrototype) {
   sim::World world = test::studio_world();
   const device::GlContext context = device::GlContext::create().value();
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
-  const apps::SessionSetup setup{world.rig, *world.scene, {}, {}};
-  apps::Perception perception = apps::Perception::create(setup.scene, setup.rig).value();
-  apps::Session session = apps::Session::create(setup, nullptr, nullptr, false).value();
+  const session::SessionSetup setup{world.rig, *world.scene, {}, {}};
+  session::Perception perception = session::Perception::create(setup.scene, setup.rig).value();
+  session::Session session = session::Session::create(setup, nullptr, nullptr, false).value();
   const int camera = 0;
   std::vector<cv::Mat> light;
   for (std::size_t i = 1; i <= 2; ++i) {

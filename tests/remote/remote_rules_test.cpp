@@ -387,7 +387,7 @@ TEST(StaticFiles, AreTheFolderAsItWasAndNothingElse) {
 }
 
 TEST(QrCode, HasAMarginAndThreeEyes) {
-  const cv::Mat code = apps::qr_code("https://192.168.7.2:8443/#pin=123456");
+  const cv::Mat code = gui::qr_code("https://192.168.7.2:8443/#pin=123456");
   ASSERT_FALSE(code.empty());
   EXPECT_EQ(code.rows, code.cols);
   const int last = code.cols - 1 - 4;
@@ -395,7 +395,7 @@ TEST(QrCode, HasAMarginAndThreeEyes) {
   for (int i = 0; i < code.cols; ++i) EXPECT_FALSE(is_black(i, 3));
   for (int i = 0; i < 7; ++i)
     EXPECT_TRUE(is_black(4 + i, 4) && is_black(last - i, 4) && is_black(4 + i, last)) << i;
-  EXPECT_TRUE(apps::qr_code(std::string(3000, 'x')).empty());
+  EXPECT_TRUE(gui::qr_code(std::string(3000, 'x')).empty());
 }
 
 }  // namespace

@@ -37,16 +37,16 @@ class AServedSession : public AServer {
     auto context = device::GlContext::create();
     ASSERT_TRUE(context) << context.message();
     context_.emplace(std::move(*context));
-    apps::SessionSetup setup;
+    session::SessionSetup setup;
     setup.rig = world.rig;
     setup.scene = *world.scene;
     setup.scene.folder = folder_ / "project";
     setup.screens = {"wall", "desk"};
     fs::create_directories(setup.scene.folder);
-    auto telemetry = apps::Telemetry::create({});
+    auto telemetry = session::Telemetry::create({});
     ASSERT_TRUE(telemetry);
     telemetry_.emplace(std::move(*telemetry));
-    auto session = apps::Session::create(setup, &*telemetry_, nullptr);
+    auto session = session::Session::create(setup, &*telemetry_, nullptr);
     ASSERT_TRUE(session) << session.message();
     session_.emplace(std::move(*session));
     health_.add({.name = "camera0", .kind = "camera"});
@@ -56,8 +56,8 @@ class AServedSession : public AServer {
 
   // What a projector shows, as the frame loop hands it over.
   cv::Mat lit_by(std::size_t projector) {
-    return apps::with_overlays(session_->composed(), session_->setup().rig,
-                               server_->overlays(&*session_))[projector];
+    return session::with_overlays(session_->composed(), session_->setup().rig,
+                                  server_->overlays(&*session_))[projector];
   }
 
   void turn() {
@@ -81,9 +81,9 @@ class AServedSession : public AServer {
 
   Stamp at_;
   std::optional<device::GlContext> context_;
-  std::optional<apps::Telemetry> telemetry_;
-  std::optional<apps::Session> session_;
-  apps::DeviceHealth health_;
+  std::optional<session::Telemetry> telemetry_;
+  std::optional<session::Session> session_;
+  session::DeviceHealth health_;
 };
 
 TEST_F(AServedSession, AnEditReachesItAndEverybodySeesIt) {
@@ -508,8 +508,8 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
   ::setrlimit(RLIMIT_NOFILE, &files);
   sim::World world = test::studio_world(0.25);
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  const apps::SessionSetup& setup = session_->setup();
-  apps::Perception perception = apps::Perception::create(setup.scene, setup.rig, setup.watch).value();
+  const session::SessionSetup& setup = session_->setup();
+  session::Perception perception = session::Perception::create(setup.scene, setup.rig, setup.watch).value();
   auto tablet_view = TabletView::create(setup, folder_ / "lenses");
   ASSERT_TRUE(tablet_view) << tablet_view.message();
   open({}, image_providers(std::move(*tablet_view)));
@@ -533,7 +533,7 @@ TEST_F(AServedSession, UnderAttackMemoryIsBoundedAndItsImagesGoOn) {
       server_->apply_edits(&*session_, at_);
       server_->publish_state(*session_, *telemetry_, health_, at_);
       guests_ms += thread_ms();
-      const apps::ComposedFrame& painted = session_->compose_and_record(at_, shifted(at_, 0.04));
+      const session::ComposedFrame& painted = session_->compose_and_record(at_, shifted(at_, 0.04));
       EXPECT_EQ(painted.painted_at, at_);
       for (std::size_t i = 0; i < painted.projectors.size(); ++i)
         EXPECT_TRUE(rig.projector(static_cast<int>(i)).show(lit_by(i)));
@@ -607,7 +607,7 @@ TEST(LiveServe, GuestsReachARunningSessionThatIsReplayed) {
   options.serve = "0";
   options.record = folder / "recording";
   // What a tablet sees of the room.
-  sim::World seen = sim::load_world(folder / "world.json", apps::marker_image).value();
+  sim::World seen = sim::load_world(folder / "world.json", tracker::marker_image).value();
   std::vector<cv::Mat> dark;
   for (const Imager& p : seen.rig.projectors) dark.push_back(cv::Mat::zeros(p.height, p.width, CV_8UC3));
   const Eigen::Vector3d p_middle = seen.world_from_prototype.translation;

@@ -45,8 +45,8 @@ class Room {
     setup_.scene = *world.scene;
     rig_.emplace(std::move(world),
                  sim::VirtualRigOptions{.frame_period_s = frame_period_s, .grab_waits_for_light = false});
-    perception_ = apps::Perception::create(setup_.scene, setup_.rig).value();
-    session_ = apps::Session::create(setup_, nullptr, nullptr, false).value();
+    perception_ = session::Perception::create(setup_.scene, setup_.rig).value();
+    session_ = session::Session::create(setup_, nullptr, nullptr, false).value();
     tablet_view_ = TabletView::create(setup_, lens_folder).value();
     for (int i = 0; i < 8; ++i) step();
   }
@@ -55,7 +55,7 @@ class Room {
   void step() {
     const int camera = 0;
     session_->update_percepts(perception_->watch(rig_->expose(std::span(&camera, 1))), ++moments_);
-    const apps::ComposedFrame& painted =
+    const session::ComposedFrame& painted =
         session_->compose_and_record(rig_->now(), shifted(rig_->now(), 0.04));
     for (std::size_t k = 0; k < painted.projectors.size(); ++k)
       (void)rig_->projector(static_cast<int>(k)).show(painted.projectors[k]).value();
@@ -86,15 +86,15 @@ class Room {
 
   TabletView& tablet_view() { return *tablet_view_; }
   void destroy_tablet_view() { tablet_view_.reset(); }
-  apps::Session& session() { return *session_; }
+  session::Session& session() { return *session_; }
   sim::VirtualRig& rig() { return *rig_; }
 
  private:
   device::GlContext context_;
-  apps::SessionSetup setup_;
+  session::SessionSetup setup_;
   std::optional<sim::VirtualRig> rig_;
-  std::optional<apps::Perception> perception_;
-  std::optional<apps::Session> session_;
+  std::optional<session::Perception> perception_;
+  std::optional<session::Session> session_;
   std::unique_ptr<TabletView> tablet_view_;
   std::size_t moments_ = 0;
 };
@@ -241,7 +241,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
   const fs::path folder = test::test_folder();
   constexpr double k_period_s = 0.1;
   Room room(folder / "lenses", 0.25, k_period_s);
-  apps::Session& session = room.session();
+  session::Session& session = room.session();
   const sim::World& world = room.rig().world();
   test::VirtualTablet tablet = room.tablet(6);
   for (int i = 0; i < 4; ++i) room.draw_window(k_tablet, tablet.shoot(1.2 * i).jpeg);  // the lens
@@ -314,7 +314,7 @@ TEST(Tablet, ViewPartsAreDrawnForATabletThatIsFollowed) {
 TEST(Tablet, AWindowShowsWhatItsGuestChoseAndTheSessionsSplit) {
   const fs::path folder = test::test_folder();
   Room room(folder / "lenses", 0.25);
-  apps::Session& session = room.session();
+  session::Session& session = room.session();
   const auto edit = [&](const char* action, const char* slot, const char* value) {
     const Status done = session.edit({action, slot, value}, "Ben", room.rig().now());
     EXPECT_TRUE(done.ok()) << done.message();

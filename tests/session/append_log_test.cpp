@@ -6,7 +6,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
@@ -63,4 +63,4 @@ TEST(AppendLog, OfTooManyLinesTheNewestAreKept) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -21,7 +21,7 @@
 #include "tests/support/soak.h"
 #include "tests/support/worlds.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -144,4 +144,4 @@ TEST(Drift, HandsAreNone) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

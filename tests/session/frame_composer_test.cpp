@@ -12,7 +12,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/worlds.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 using namespace test::literals;
@@ -71,4 +71,4 @@ TEST(FrameComposer, APrototypeThatStandsStillIsShownWhereItWas) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -14,7 +14,7 @@
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Clock, source, sink and client in one; they note which functions are called.
@@ -132,4 +132,4 @@ TEST_F(AFrameLoop, EndsWhenAClientDoes) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -15,7 +15,7 @@
 #include "tests/support/soak.h"
 #include "tests/tracker/marker_images.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 using namespace test::literals;
@@ -260,4 +260,4 @@ TEST(Hands, ThatPassDoNotAct) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

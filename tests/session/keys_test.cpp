@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 constexpr int k_escape = 256, k_tab = 258, k_right = 262, k_page_up = 266, k_f1 = 290;  // GLFW's
@@ -46,4 +46,4 @@ TEST(Keys, WithoutSlotsDoWhatNeedsNone) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

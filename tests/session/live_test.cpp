@@ -35,7 +35,7 @@
 #include "tracker/marker_image.h"
 #include "tracker/predict.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -45,7 +45,7 @@ using nlohmann::json;
 constexpr double k_mended_s = 5.4;  // time of a repair on the virtual clock, plus half a second
 TEST(Live, ASessionIsReplayedToTheLastDigit) {
   const fs::path folder = test::test_folder();
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.5;
   options.script = write_json(
       folder / "script.json",
@@ -61,7 +61,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
                  {{"at_s", 0.6}, {"edit", {{"action", "next_variant"}, {"slot", "no"}}}}}));
   options.record = folder / "recording";
   options.out = folder / "out";
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   ASSERT_TRUE(lived.ok()) << lived.message();
   const json summary = read_json(folder / "out/session.json");
   EXPECT_EQ(summary.at("pictures"), 21);
@@ -74,10 +74,10 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   EXPECT_EQ(poses.size(), 1 + 21u * 2);
   EXPECT_NE(poses.back().find(",trim,"), std::string::npos);
 
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
   replay.out = folder / "replayed";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
   EXPECT_EQ(poses, lines_of(folder / "replayed/poses.csv"));
 
@@ -87,7 +87,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
     std::string text;
     for (const std::string& line : lines) text += line + "\n";
     EXPECT_TRUE(write_file(folder / "recording/events.jsonl", text));
-    return run_replay(replay);
+    return apps::run_replay(replay);
   };
   auto other = events;
   other.resize(4);
@@ -108,7 +108,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
 // rig.
 TEST(Live, GoesOnWithAMendedRig) {
   const fs::path folder = test::test_folder();
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.5;
   options.frame_period_s = 0.1;
   const auto edit = [](double at_s, const std::string& action, const std::string& value) {
@@ -124,7 +124,7 @@ TEST(Live, GoesOnWithAMendedRig) {
                              edit(0.45, "repair", "")}));
   options.record = folder / "recording";
   options.out = folder / "out";
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   ASSERT_TRUE(lived.ok()) << lived.message();
   const Imager before = studio_world(0.5).rig.projectors[1];
   const Pose nudge(exp_rotation(Eigen::Vector3d(0, 0.25, 0) * M_PI / 180), Eigen::Vector3d::Zero());
@@ -141,14 +141,14 @@ TEST(Live, GoesOnWithAMendedRig) {
   const auto poses = lines_of(folder / "out/poses.csv");
   EXPECT_NE(poses[poses.size() - 2].find(",mirror,sport,"), std::string::npos) << poses[poses.size() - 2];
 
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
   // The session really continued with the corrected rig: with the old one the replay differs.
   fs::copy(folder / "recording/rig", folder / "recording/rig-2",
            fs::copy_options::recursive | fs::copy_options::overwrite_existing);
-  const Status other = run_replay(replay);
+  const Status other = apps::run_replay(replay);
   ASSERT_FALSE(other.ok());
   EXPECT_NE(other.message().find("expected the recorded projector"), std::string::npos) << other.message();
 }
@@ -159,7 +159,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   auto told = UdpSocket::hearing({"127.0.0.1", "0"});
   ASSERT_TRUE(told) << told.message();
   copy_studio_to(folder);
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.5;
   options.world = folder / "world.json";
   options.seconds = 1e5;  // ended below
@@ -195,7 +195,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
     was_told = was_told && say("/limn/save_look", {"last"}, "last");
     std::raise(SIGTERM);
   });
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   other.join();
   ASSERT_TRUE(lived.ok()) << lived.message();
   EXPECT_TRUE(was_told);
@@ -204,9 +204,9 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   EXPECT_NE(page.find("restore_look heard (osc)"), std::string::npos);
   EXPECT_NE(page.find("OSC refused: restore_look: expected one of heard, found 'never'"), std::string::npos);
   EXPECT_TRUE(fs::exists(folder / "door/looks/heard.json"));
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
@@ -249,8 +249,8 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   Telemetry unused = Telemetry::create({}).value();
   auto fresh = Session::create(setup, &unused, nullptr, false);  // this one has never lost its context
   ASSERT_TRUE(fresh);
-  fresh->take(perception->percepts(), 1);
-  const cv::Mat expected = fresh->paint(rig.now(), shifted(rig.now(), 0.03)).projectors[0];
+  fresh->update_percepts(perception->percepts(), 1);
+  const cv::Mat expected = fresh->compose_and_record(rig.now(), shifted(rig.now(), 0.03)).projectors[0];
   EXPECT_EQ(cv::norm(anew, expected, cv::NORM_INF), 0);
   EXPECT_FALSE(is_lost);
   EXPECT_FALSE(session->screen().empty());
@@ -316,22 +316,22 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   EXPECT_GT(cv::norm(screens[1]->shown, seen, cv::NORM_INF), 50) << "this screen shows parts";
   EXPECT_EQ(cv::countNonZero(screens[2]->shown.reshape(1)), 0);
   ASSERT_TRUE(output->close(&*session, false));
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
 // A camera fails and works again: parts are extrapolated, fade out, and are shown again.
 TEST(Live, GoesOnWithoutItsCamera) {
   const fs::path folder = test::test_folder();
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.5;
   options.script = write_json(folder / "script.json",
                               script_of(1.6, {{{"at_s", 0.3}, {"until_s", 1.3}, {"unplug", "camera0"}}}));
   options.out = folder / "out";
   options.record = folder / "recording";
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   ASSERT_TRUE(lived.ok()) << lived.message();
   const json summary = read_json(folder / "out/session.json");
   EXPECT_EQ(summary.at("missed_frames"), 30);
@@ -351,11 +351,11 @@ TEST(Live, GoesOnWithoutItsCamera) {
 TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
   const fs::path folder = test::test_folder();
   const auto lived = [&](const std::string& name, double duration_s, const json& events) {
-    LiveOptions options;
+    apps::LiveOptions options;
     options.resolution = 0.5;
     options.script = write_json(folder / (name + ".json"), script_of(duration_s, events));
     options.out = folder / name;
-    const Status status = run_live(options);
+    const Status status = apps::run_live(options);
     EXPECT_TRUE(status.ok()) << status.message();
     return read_json(options.out / "session.json");
   };
@@ -391,12 +391,12 @@ TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
 TEST(Live, RefillsASomebodysShadow) {
   const fs::path folder = test::test_folder();
   const auto light = [&](const std::string& name, bool refill, const json& events) {
-    LiveOptions options;
+    apps::LiveOptions options;
     options.resolution = 0.5;
     options.refill = refill;
     options.script = write_json(folder / (name + ".json"), script_of(0.6, events));
     options.out = folder / name;
-    EXPECT_TRUE(run_live(options).ok());
+    EXPECT_TRUE(apps::run_live(options).ok());
     return read_image(options.out / "projector-projector1.png").value();
   };
   const json hand = {{{"at_s", 0.3}, {"until_s", 2}, {"block", "projector0"}}};
@@ -412,7 +412,7 @@ TEST(Live, RefillsASomebodysShadow) {
 TEST(Live, KeepsLooks) {
   const fs::path folder = test::test_folder();
   copy_studio_to(folder);
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.5;
   options.world = folder / "world.json";
   const auto edit = [](double at_s, const std::string& action, const std::string& value) {
@@ -430,7 +430,7 @@ TEST(Live, KeepsLooks) {
                        edit(0.27, "delete_look", "third"),
                        edit(0.29, "delete_look", "calm"),
                        edit(0.31, "undelete_look", "")}));
-  ASSERT_TRUE(run_live(options).ok());
+  ASSERT_TRUE(apps::run_live(options).ok());
   const fs::path looks = folder / "door/looks";
   const json calm = read_json(looks / "calm.json"), bold = read_json(looks / "bold.json");
   EXPECT_NE(calm.at("slots").at("mirror").at("variant"), bold.at("slots").at("mirror").at("variant"));
@@ -456,7 +456,7 @@ TEST(Live, KeepsLooks) {
   options.script =
       write_json(folder / "next.json", script_of(0.2, json::array({edit(0.1, "restore_look", "bold")})));
   options.out = folder / "out";
-  ASSERT_TRUE(run_live(options).ok());
+  ASSERT_TRUE(apps::run_live(options).ok());
   const auto poses = lines_of(folder / "out/poses.csv");
   const auto& translation = bold.at("slots").at("mirror").at("prototype_from_part").at("translation_m");
   EXPECT_NE(
@@ -500,7 +500,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
       << (*broken)->skipped_variants[0].why;
   fs::remove(dropped);
 
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.5;
   options.world = folder / "world.json";
   options.seconds = 1e5;  // ended below
@@ -520,7 +520,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
     wait_for_images(16);
     std::raise(SIGTERM);
   });
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   person.join();
   ASSERT_TRUE(lived.ok()) << lived.message();
   const std::string page = read_file(folder / "out/session.html").value();
@@ -530,9 +530,9 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   for (const std::string& line : lines_of(folder / "out/poses.csv"))
     if (line.find(",mirror,") != std::string::npos) last = line;
   EXPECT_NE(last.find(",mirror,new,"), std::string::npos) << last;
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
@@ -596,7 +596,8 @@ TEST(Live, ViewersOfAllKindsShareAnEyeThatNeverJumps) {
   const Eigen::Vector3d p_cap(0.2, -0.75, 0.62);
   const Eigen::Vector3d p_camera = world.rig.cameras[0].imager_from_world.inverse().translation;
   const Pose world_from_cap = looking_at(p_cap, 2 * p_cap - p_camera, Eigen::Vector3d::UnitZ()).inverse();
-  ASSERT_TRUE(sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, marker_image));
+  ASSERT_TRUE(
+      sim::add_marker(world, {*cap.marker, cap.marker_size_m, world_from_cap}, false, tracker::marker_image));
   const fs::path folder = test::test_folder();
   const auto script = load_script(write_json(
       folder / "script.json", script_of(6, {{{"at_s", 2.4}, {"until_s", 4.8}, {"cover", k_cap}}})));
@@ -671,14 +672,14 @@ TEST(Live, MakesARoomForARigAndAScene) {
 
 TEST(Live, SaysWhatIsWrong) {
   const fs::path folder = test::test_folder();
-  const auto message = [](const LiveOptions& options) {
-    const Status status = run_live(options);
+  const auto message = [](const apps::LiveOptions& options) {
+    const Status status = apps::run_live(options);
     return status.ok() ? std::string("no error") : status.message();
   };
-  LiveOptions one;
+  apps::LiveOptions one;
   one.rig = folder;
   EXPECT_NE(message(one).find("--rig and --scene together"), std::string::npos);
-  LiveOptions script;
+  apps::LiveOptions script;
   script.script = write_json(folder / "a.json", script_of(1, {{{"at_s", 0.2}, {"dance", "x"}}}));
   EXPECT_NE(
       message(script).find(
@@ -706,7 +707,7 @@ TEST(Live, SaysWhatIsWrong) {
     script.script = write_json(folder / "d.json", script_of(1, json::array({event})));
     EXPECT_NE(message(script).find(why), std::string::npos) << event << message(script);
   }
-  LiveOptions other_rig;  // it has another projector size
+  apps::LiveOptions other_rig;  // it has another projector size
   sim::World world = studio_world();
   world.rig.projectors[1].width = 1024;
   ASSERT_TRUE(save_rig(world.rig, folder / "rig"));
@@ -716,17 +717,17 @@ TEST(Live, SaysWhatIsWrong) {
   EXPECT_NE(message(other_rig).find("projector1: expected the device's size 1280x800, found 1024x800"),
             std::string::npos)
       << message(other_rig);
-  LiveOptions twice;
+  apps::LiveOptions twice;
   twice.seconds = 0.04;
   twice.resolution = 0.5;
   twice.record = folder / "recording";
   ASSERT_TRUE(make_folder(folder / "recording").ok());
   ASSERT_TRUE(write_file(folder / "recording/session.json", "{}"));
   EXPECT_NE(message(twice).find("expected a folder without a session"), std::string::npos) << message(twice);
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "none";
-  EXPECT_FALSE(run_replay(replay).ok());
+  EXPECT_FALSE(apps::run_replay(replay).ok());
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

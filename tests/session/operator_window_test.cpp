@@ -19,7 +19,7 @@
 #include "tests/support/display.h"
 #include "tests/support/worlds.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -100,7 +100,7 @@ TEST(OperatorPanel, ShowsImagesUndistortedWithTheirMarkers) {
     test::GuiCanvas canvas(size);
     OperatorPanel panel;
     const OperatorView view = a_view();
-    for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { panel.draw(gui, view); });
+    for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { panel.draw(gui, view); });
     canvas.keep(fmt::format("operator-{}", size.width));
     const cv::Mat image = canvas.image();
     for (const cv::Scalar& colour : {k_violet, k_teal}) {
@@ -128,7 +128,7 @@ std::set<std::string> reachable(const OperatorView& view, cv::Size size, const c
   for (int y = area.y; y < area.br().y; y += 18) {
     for (int x = area.x; x < area.br().x; x += area.width / columns) {
       OperatorPanel panel;
-      canvas.click(cv::Point2f(static_cast<float>(x), static_cast<float>(y)), [&](Gui& gui) {
+      canvas.click(cv::Point2f(static_cast<float>(x), static_cast<float>(y)), [&](gui::Gui& gui) {
         for (const scene::Edit& edit : panel.draw(gui, view).edits)
           all.insert(edit.action + (edit.slot.empty() ? "" : " " + edit.slot) +
                      (edit.value.empty() ? "" : " " + edit.value));
@@ -170,7 +170,7 @@ TEST(OperatorPanel, PairsAndComparesByClicks) {
   view.show_state.split = true;
   test::GuiCanvas canvas({1600, 1000});
   OperatorPanel panel;
-  for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { panel.draw(gui, view); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { panel.draw(gui, view); });
   canvas.keep("operator-compares");
   for (auto* images : {&view.cameras, &view.projectors}) images->clear();
   const std::set<std::string> column = reachable(view, {1600, 1000}, {1290, 60, 280, 660}, 2);
@@ -185,7 +185,7 @@ TEST(OperatorPanel, AnImageGrowsWhenClicked) {
   test::GuiCanvas canvas({1000, 640});
   OperatorPanel panel;
   const OperatorView view = a_view();
-  const auto draw = [&](Gui& gui) { panel.draw(gui, view); };
+  const auto draw = [&](gui::Gui& gui) { panel.draw(gui, view); };
   for (int i = 0; i < 2; ++i) canvas.draw(draw);
   const cv::Rect before = box_of(canvas.image(), k_violet);
   canvas.click((before.tl() + before.br()) / 2, draw);
@@ -197,7 +197,7 @@ TEST(OperatorPanel, AnImageGrowsWhenClicked) {
 // Whether the window shows the QR code of this text.
 bool shows_code(const cv::Mat& image, const std::string& text) {
   const cv::Rect box = box_of(image(cv::Rect(0, 50, 720, 720)), cv::Scalar::all(255)) + cv::Point(0, 50);
-  const cv::Mat code = qr_code(text);
+  const cv::Mat code = gui::qr_code(text);
   if (box.width < 8 * code.cols) return false;
   for (int row = 0; row < code.rows; ++row)
     for (int column = 0; column < code.cols; ++column) {
@@ -212,7 +212,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   OperatorView view = a_view();
   test::GuiCanvas canvas({1600, 1000});
   OperatorPanel panel;
-  const auto draw = [&](Gui& gui) { panel.draw(gui, view); };
+  const auto draw = [&](gui::Gui& gui) { panel.draw(gui, view); };
   for (int i = 0; i < 2; ++i) canvas.draw(draw);
   const std::string page = "https://192.168.7.2:8443/#pin=";
   EXPECT_FALSE(shows_code(canvas.image(), page + "234567"));
@@ -222,7 +222,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
                               "1F:2E:3D:4C:5B:6A:79:88:97:A6:B5:C4:D3:E2:F1:00:"
                               "1F:2E:3D:4C:5B:6A:79:88:97:A6:B5:C4:D3:E2:F1:00",
                               {"123456", "234567", "345678"}};
-  view.remote = shown(invitation);
+  view.remote = remote_view(invitation);
   canvas.click({435, 25}, draw);  // Remote
   canvas.draw(draw);
   canvas.keep("operator-remote");
@@ -241,7 +241,7 @@ TEST(OperatorPanel, InvitesGuestsByACodeOrByPin) {
   canvas.keep("operator-remote-viewers");
   std::set<std::string> asked;
   for (int y = 280; y < 900; y += 18)
-    canvas.click({800, static_cast<float>(y)}, [&](Gui& gui) {
+    canvas.click({800, static_cast<float>(y)}, [&](gui::Gui& gui) {
       const OperatorAsked now = panel.draw(gui, view);
       for (const scene::Edit& edit : now.edits) asked.insert(edit.action + " " + edit.value);
       if (now.code) asked.insert("code " + name_of(now.code->role) + " " + now.code->projector);
@@ -259,7 +259,7 @@ TEST(OperatorPanel, MaterialsAndLightAreSetInABox) {
   const auto asked_in = [&](cv::Point2f button, const std::string& image) {
     OperatorPanel panel;
     std::set<std::string> asked;
-    const auto draw = [&](Gui& gui) {
+    const auto draw = [&](gui::Gui& gui) {
       for (const scene::Edit& edit : panel.draw(gui, view).edits)
         asked.insert(fmt::format("{}|{}|{}", edit.action, edit.slot, edit.value));
     };
@@ -297,7 +297,7 @@ TEST(OperatorPanel, AsksBeforeItEnds) {
   OperatorPanel panel;
   const OperatorView view = a_view();
   bool ends = false;
-  const auto draw = [&](Gui& gui) { ends |= panel.draw(gui, view).ends; };
+  const auto draw = [&](gui::Gui& gui) { ends |= panel.draw(gui, view).ends; };
   panel.ask_to_end();
   for (int i = 0; i < 3; ++i) canvas.draw(draw);
   canvas.keep("operator-question");
@@ -309,7 +309,7 @@ TEST(OperatorPanel, AsksBeforeItEnds) {
 }
 
 // A person uses a session's window while it runs: does `acts` once the window exists, then closes it.
-std::string session_with(LiveOptions options,
+std::string session_with(apps::LiveOptions options,
                          const fs::path& out,
                          const std::function<void(test::XPerson*)>& acts) {
   options.window = true;
@@ -322,7 +322,7 @@ std::string session_with(LiveOptions options,
     std::this_thread::sleep_for(milliseconds(3000));  // long enough for one image on a busy machine
     x.close();
   });
-  const Status played = run_live(options);
+  const Status played = apps::run_live(options);
   person.join();
   EXPECT_TRUE(played.ok()) << (played ? "" : played.message());
   return read_file(options.out / "session.html").value();
@@ -337,7 +337,7 @@ void press_keys(test::XPerson* x) {
 
 TEST(OperatorWindow, KeysAndClicksReachAVirtualSession) {
   if (!test::has_x_server()) GTEST_SKIP() << "no display: OperatorWindow.KeysAndClicksReachAVirtualSession";
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.25;
   options.seconds = 100000;
   const std::string page = session_with(options, test::test_folder(), [](test::XPerson* x) {
@@ -375,7 +375,7 @@ TEST(OperatorWindow, KeysReachASessionOnDevices) {
       write_file(folder / "devices.json",
                  fmt::format("{{\"schema\": \"limn.devices/1\", \"cameras\": [{}], \"displays\": [{}]}}",
                              cameras, displays)));
-  LiveOptions options;
+  apps::LiveOptions options;
   options.rig = folder / "rig";
   options.scene = scene;
   options.devices = folder / "devices.json";
@@ -386,4 +386,4 @@ TEST(OperatorWindow, KeysReachASessionOnDevices) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

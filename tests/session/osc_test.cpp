@@ -18,7 +18,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/worlds.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -227,7 +227,7 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   ASSERT_TRUE(port) << port.message();
   const auto hear = [&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    port->hear(&*session_, &*telemetry_, Stamp{});
+    port->apply_edits(&*session_, &*telemetry_, Stamp{});
   };
   const lo_address to = lo_address_new("127.0.0.1", std::to_string(port->port()).c_str());
   const auto& variants = session_->setup().scene.slots[0].variants;
@@ -278,7 +278,7 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
   double moved_mm = -1;
   for (; calls < 1000; ++calls) {
     const double before_mm = std::exchange(moved_mm, 1e3 * session_->show_state().slots[0].nudge.x());
-    port->hear(&*session_, &*telemetry_, Stamp{});
+    port->apply_edits(&*session_, &*telemetry_, Stamp{});
     const double now_mm = 1e3 * session_->show_state().slots[0].nudge.x();
     EXPECT_LE(now_mm - moved_mm, OscPort::k_most_at_once + 1e-6);
     if (calls > 0 && now_mm == moved_mm && moved_mm == before_mm) break;
@@ -286,12 +286,12 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
   EXPECT_GT(moved_mm, OscPort::k_most_at_once);  // the others waited and were applied later
   EXPECT_LT(moved_mm, 2999);                     // messages beyond the buffer's size are lost
   for (int i = 0; i < 200; ++i) lo_send(to, "/limn/dance", "");
-  for (int i = 0; i < 10; ++i) port->hear(&*session_, &*telemetry_, Stamp{});
+  for (int i = 0; i < 10; ++i) port->apply_edits(&*session_, &*telemetry_, Stamp{});
   const std::string text = page();
   const auto first = text.find("OSC refused");
   ASSERT_NE(first, std::string::npos);
   EXPECT_EQ(text.find("OSC refused", first + 1), std::string::npos);
-  port->hear(&*session_, &*telemetry_, shifted(Stamp{}, 1));
+  port->apply_edits(&*session_, &*telemetry_, shifted(Stamp{}, 1));
   EXPECT_NE(page().find("more refused meanwhile"), std::string::npos);
   lo_address_free(to);
 }
@@ -319,7 +319,7 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   ASSERT_TRUE(port) << port.message();
   const auto heard = [&](Stamp at = Stamp{}) {
     told.lines.clear();
-    port->tell(*session_, at);
+    port->publish_state(*session_, at);
     while (lo_server_recv_noblock(ear, 20) > 0) {
     }
     return told.lines;
@@ -397,4 +397,4 @@ TEST(OscPort, SaysWhatIsWrongWithAPlace) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

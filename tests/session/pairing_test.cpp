@@ -21,7 +21,7 @@
 #include "tests/tracker/marker_images.h"
 #include "tracker/marker_image.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -87,7 +87,7 @@ TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
 
 TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
   const fs::path folder = test::test_folder();
-  LiveOptions options;
+  apps::LiveOptions options;
   options.world = studio_in(folder);
   options.resolution = 0.5;
   options.out = folder / "out";
@@ -100,7 +100,7 @@ TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
                                                          {{"at_s", 1.5}, {"edit", pair}}}}})
                                                      .dump()));
   options.script = folder / "script.json";
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   ASSERT_TRUE(lived.ok()) << lived.message();
   const std::string page = read_file(folder / "out/session.html").value();
   EXPECT_NE(page.find("pair mirror aruco_4x4_50:9 (script)"), std::string::npos);
@@ -113,24 +113,24 @@ TEST(Pairing, AMarkerThatLiesStillIsPairedAndStaysSo) {
   EXPECT_NEAR((last_place(folder / "out/poses.csv", "mirror") - 1e3 * k_laid).norm(), offset_mm, 3);
   EXPECT_EQ(test::read_json(folder / "door/pairings.json")["slots"]["mirror"], k_nine.text());
 
-  ReplayOptions replay;
+  apps::ReplayOptions replay;
   replay.session = folder / "recording";
-  const Status replayed = run_replay(replay);
+  const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed.ok()) << replayed.message();
 
   // The next session keeps the pairing until it is undone.
-  LiveOptions next = options;
+  apps::LiveOptions next = options;
   next.record.clear();
   next.out = folder / "next";
   ASSERT_TRUE(
       write_file(folder / "script.json", R"({"schema": "limn.script/1", "seconds": 0.5, "events": []})"));
-  ASSERT_TRUE(run_live(next).ok());
+  ASSERT_TRUE(apps::run_live(next).ok());
   EXPECT_NEAR((last_place(folder / "next/poses.csv", "mirror") - 1e3 * k_laid).norm(), offset_mm, 3);
   ASSERT_TRUE(write_file(folder / "script.json",
                          R"({"schema": "limn.script/1", "seconds": 0.3, "events": [
                              {"at_s": 0.1, "edit": {"action": "unpair", "slot": "mirror"}}]})"));
   next.out = folder / "last";
-  ASSERT_TRUE(run_live(next).ok());
+  ASSERT_TRUE(apps::run_live(next).ok());
   EXPECT_GT((last_place(folder / "last/poses.csv", "mirror") - 1e3 * k_laid).norm(), 100);
   EXPECT_FALSE(fs::exists(folder / "door/pairings.json"));
 }
@@ -140,7 +140,7 @@ class ASession : public testing::Test {
  protected:
   void SetUp() override {
     folder_ = test::test_folder();
-    auto world = sim::load_world(studio_in(folder_), marker_image);
+    auto world = sim::load_world(studio_in(folder_), tracker::marker_image);
     ASSERT_TRUE(world) << world.message();
     ASSERT_TRUE(scale_resolution(0.5, &world->rig).ok());
     setup_.rig = world->rig;
@@ -435,4 +435,4 @@ TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -14,7 +14,7 @@
 #include "tests/support/matchers.h"
 #include "tracker/predict.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -85,7 +85,7 @@ TEST(Perception, LooksForCoveredMarkersWhileOneIsMissing) {
   const MarkerName control = MarkerName::parse("apriltag_36h11:9").value();
   world.scene->controls = {{control, scene::ActionId::next_variant, "mirror", Gesture::cover}};
   const Pose lying(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45});
-  ASSERT_TRUE(sim::add_marker(world, {control, 0.05, lying}, false, marker_image));
+  ASSERT_TRUE(sim::add_marker(world, {control, 0.05, lying}, false, tracker::marker_image));
   sim::VirtualRig rig(world, {.grab_waits_for_light = false});
   const int camera = 0;
   Frame whole = rig.expose(std::span(&camera, 1))[0];
@@ -149,7 +149,7 @@ TEST(Perception, ReadsWhatControlMarkersSay) {
       sim::add_marker(world,
                       {world.scene->controls[0].marker, 0.05,
                        Pose(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45})},
-                      false, marker_image));
+                      false, tracker::marker_image));
   const fs::path folder = test::test_folder();
   const auto script =
       load_script(write_json(folder / "script.json",
@@ -178,4 +178,4 @@ TEST(Perception, ReadsWhatControlMarkersSay) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

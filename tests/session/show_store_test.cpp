@@ -15,7 +15,7 @@
 #include "session/file_writer.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -127,4 +127,4 @@ TEST(ShowStore, WritesNothingWhereItOnlyReads) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

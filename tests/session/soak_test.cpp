@@ -25,7 +25,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -97,7 +97,7 @@ class Soak : public testing::Test {
     copy_studio_to(folder_);
     json script = script_of(seconds_, events());
     script["again_every_s"] = k_period_s;
-    LiveOptions options;
+    apps::LiveOptions options;
     options.resolution = 0.34;
     options.frame_period_s = 0.2;  // below 0.3 s, after which a marker is lost and its filter starts again
     options.world = folder_ / "world.json";
@@ -107,7 +107,7 @@ class Soak : public testing::Test {
     fs::create_directories(dropped().parent_path());
     std::atomic<bool> has_ended = false;
     std::thread outside([&] { disturb(part, has_ended); });
-    const Status lived = run_live(options);
+    const Status lived = apps::run_live(options);
     end_mib_ = test::resident_mib();
     has_ended = true;
     outside.join();
@@ -214,4 +214,4 @@ TEST_F(Soak, MemoryDoesNotGrow) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -8,7 +8,7 @@
 
 #include "tests/support/worlds.h"
 
-namespace limn::apps {
+namespace limn::session {
 
 using test::copy_studio_to;
 using test::read_json;
@@ -28,4 +28,4 @@ inline std::vector<std::string> lines_of(const std::filesystem::path& path) {
   return lines;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::session

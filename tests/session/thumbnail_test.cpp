@@ -8,7 +8,7 @@
 #include "device/gl_context.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 // Each variant fills its image without being cut off, and differs from the others.
@@ -40,4 +40,4 @@ TEST(Thumbnail, ShowsEachVariantWhole) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

@@ -15,7 +15,7 @@
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
@@ -51,11 +51,11 @@ TEST(Trigger, IsSeenWithinATenthOfASecond) {
   }
   const json script = {{"schema", "limn.script/1"}, {"seconds", triggers_s.back() + 0.3}, {"events", events}};
   ASSERT_TRUE(write_file(folder / "script.json", script.dump()));
-  LiveOptions options;
+  apps::LiveOptions options;
   options.resolution = 0.34;
   options.script = folder / "script.json";
   options.out = folder / "out";
-  const Status lived = run_live(options);
+  const Status lived = apps::run_live(options);
   ASSERT_TRUE(lived.ok()) << lived.message();
 
   const auto shown = shown_variants(folder / "out/poses.csv", "mirror");
@@ -73,4 +73,4 @@ TEST(Trigger, IsSeenWithinATenthOfASecond) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::session

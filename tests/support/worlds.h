@@ -16,12 +16,12 @@ inline std::filesystem::path config_folder() { return std::filesystem::path(LIMN
 
 /// A camera, a projector and the door on a bench.
 inline sim::World bench_world() {
-  return sim::load_world(config_folder() / "worlds/bench.json", apps::marker_image).value();
+  return sim::load_world(config_folder() / "worlds/bench.json", tracker::marker_image).value();
 }
 
 /// A camera, two projectors and the door in a studio. Images have `resolution` times their width and height.
 inline sim::World studio_world(double resolution = 1) {
-  sim::World world = sim::load_world(config_folder() / "worlds/studio.json", apps::marker_image).value();
+  sim::World world = sim::load_world(config_folder() / "worlds/studio.json", tracker::marker_image).value();
   if (resolution != 1) {
     EXPECT_TRUE(scale_resolution(resolution, &world.rig).ok());
   }

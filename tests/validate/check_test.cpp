@@ -20,7 +20,7 @@
 #include "tests/support/run_limn.h"
 #include "validate/check_judge.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -475,4 +475,4 @@ TEST(Check, WithoutEglTheErrorSaysWhatToDo) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::validate

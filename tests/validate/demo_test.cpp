@@ -11,12 +11,12 @@
 #include "tests/support/json.h"
 #include "tests/support/matchers.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
   const auto folder = test::test_folder();
-  const Status done = run_demo({.out = folder});
+  const Status done = apps::run_demo({.out = folder});
   ASSERT_TRUE(done) << done.message();
   const auto json = test::read_json(folder / "demo.json");
   EXPECT_LE(json.at("held_out_px"), 0.1);
@@ -43,4 +43,4 @@ TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::validate

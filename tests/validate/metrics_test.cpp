@@ -7,7 +7,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/meshes.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 using namespace test::literals;
@@ -150,4 +150,4 @@ TEST(Judge, LabelsMustAgreeForTheirIntersection) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -59,7 +59,8 @@ int main(int argc, char** argv) {
   const fs::path folder = argv[1];
   fs::remove_all(folder);
   fs::create_directories(folder);
-  auto loaded = sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", apps::marker_image);
+  auto loaded =
+      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image);
   if (!loaded) {
     fmt::print(stderr, "{}\n", loaded.message());
     return 1;

@@ -15,16 +15,16 @@ namespace limn::test {
 
 /// A virtual room with one camera, one projector, and a person who carries the board to the next pose.
 struct BoardRoom {
-  apps::Plan plan;
+  wizard::Plan plan;
   sim::VirtualRig rig;
   Pose from, to;
   int steps_left = 0;            // until the board is there
   int moved = 0;                 // number of patterns shown while the board moved
   std::function<void()> person;  // acts before each frame; may be empty
 
-  explicit BoardRoom(const apps::Plan& wanted, double display_delay_s = 0.12)
+  explicit BoardRoom(const wizard::Plan& wanted, double display_delay_s = 0.12)
       : plan(wanted),
-        rig(sim::load_world(wanted.world, apps::marker_image).value(),
+        rig(sim::load_world(wanted.world, tracker::marker_image).value(),
             {.display_delay_s = display_delay_s, .frame_period_s = 0.1, .grab_waits_for_light = false}) {
     rig.remove_prototype();
     from = to = plan.world_from_board[0];
@@ -42,9 +42,9 @@ struct BoardRoom {
     Pose now = to;
     now.translation = from.translation + share * (to.translation - from.translation);
     now.rotation = from.rotation.slerp(share, to.rotation);
-    rig.place(apps::board_object(plan.board, now));
+    rig.place(wizard::board_object(plan.board, now));
   }
-  apps::DeviceBackend::Devices devices();
+  wizard::DeviceBackend::Devices devices();
   static constexpr int k_steps = 4;
 };
 
@@ -81,11 +81,11 @@ class BoardRoomProjector : public device::Display {
   BoardRoom* room_;
 };
 
-inline apps::DeviceBackend::Devices BoardRoom::devices() {
-  apps::DeviceBackend::Devices all{.cameras = {},
-                                   .projectors = {},
-                                   .now = [this] { return rig.now(); },
-                                   .wait = [this](double seconds) { rig.advance(seconds); }};
+inline wizard::DeviceBackend::Devices BoardRoom::devices() {
+  wizard::DeviceBackend::Devices all{.cameras = {},
+                                     .projectors = {},
+                                     .now = [this] { return rig.now(); },
+                                     .wait = [this](double seconds) { rig.advance(seconds); }};
   all.cameras.push_back(std::make_unique<BoardRoomCamera>(this));
   all.projectors.push_back(std::make_unique<BoardRoomProjector>(this));
   return all;

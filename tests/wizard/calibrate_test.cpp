@@ -15,7 +15,7 @@
 #include "wizard/pose_instructions.h"
 #include "wizard/pose_quality.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -25,9 +25,9 @@ using test::read_json;
 using test::small_plan;
 
 // What `limn calibrate --json` prints.
-json calibrated_json(const CalibrateOptions& options) {
+json calibrated_json(const apps::CalibrateOptions& options) {
   testing::internal::CaptureStdout();
-  const Status status = run_calibrate(options);
+  const Status status = apps::run_calibrate(options);
   const std::string printed = testing::internal::GetCapturedStdout();
   EXPECT_TRUE(status.ok()) << status.message();
   return status.ok() ? json::parse(printed) : json();
@@ -48,7 +48,7 @@ void expect_prototype(const json& done, const fs::path& rig, const fs::path& wor
   EXPECT_LT(done["prototype"]["painted_p95_mm"].get<double>(), 1);
   EXPECT_GT(done["prototype"]["painted_good"].get<double>(), 0.95);
 
-  const sim::World world = sim::load_world(world_file, marker_image).value();
+  const sim::World world = sim::load_world(world_file, tracker::marker_image).value();
   const Pose truth = world.rig.cameras[0].imager_from_world * world.world_from_prototype;
   const json found = read_json(rig / "scan/poses.json")["world_from_prototype"]["translation_m"];
   EXPECT_NEAR(found[0].get<double>(), truth.translation.x(), 1e-3);
@@ -72,7 +72,7 @@ void expect_prototype(const json& done, const fs::path& rig, const fs::path& wor
 // Calibrates from nothing, then continues after an interrupted pose, then refuses another plan.
 TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const fs::path folder = test::test_folder(), plan = small_plan(folder), out = folder / "rig";
-  const CalibrateOptions options{.plan = plan, .out = out, .json = true};
+  const apps::CalibrateOptions options{.plan = plan, .out = out, .json = true};
   const json first = calibrated_json(options);
   ASSERT_FALSE(first.is_null());
   EXPECT_EQ(first["verdict"], "good");
@@ -109,7 +109,7 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const auto kept = written_at("pose01/camera0/035.png"), torn = written_at("pose02/camera0/000.png");
   fs::remove(captures / "pose02/camera0/035.png");
   fs::remove(out / "rig.json");
-  CalibrateOptions with_scan = options;
+  apps::CalibrateOptions with_scan = options;
   with_scan.scan = true;
   const json second = calibrated_json(with_scan);
   ASSERT_FALSE(second.is_null());
@@ -128,7 +128,7 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   json other = read_json(plan);
   other["board"] = "charuco:8x6:56mm";
   ASSERT_TRUE(write_file(plan, other.dump(2)).ok());
-  const Status refused = run_calibrate(options);
+  const Status refused = apps::run_calibrate(options);
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.message().find("plan.board"), std::string::npos) << refused.message();
   EXPECT_NE(refused.message().find("charuco:8x6:55mm"), std::string::npos) << refused.message();
@@ -142,11 +142,11 @@ TEST(Calibrate, LeavesCapturesOfOthersAlone) {
   ASSERT_TRUE(write_file(folder / "rig/captures/capture.json", "{}").ok());
   if (!std::getenv("DISPLAY") && !std::getenv("WAYLAND_DISPLAY")) {
     testing::internal::CaptureStderr();
-    EXPECT_FALSE(run_calibrate({.plan = plan, .out = folder / "rig"}).ok());
+    EXPECT_FALSE(apps::run_calibrate({.plan = plan, .out = folder / "rig"}).ok());
     const std::string said = testing::internal::GetCapturedStderr();
     EXPECT_NE(said.find("in the terminal"), std::string::npos) << said;
   }
-  const Status refused = run_calibrate({.plan = plan, .out = folder / "rig", .terminal = true});
+  const Status refused = apps::run_calibrate({.plan = plan, .out = folder / "rig", .terminal = true});
   ASSERT_FALSE(refused.ok());
   EXPECT_NE(refused.message().find("Choose another --out"), std::string::npos) << refused.message();
   EXPECT_EQ(read_file(folder / "rig/captures/capture.json").value(), "{}");
@@ -172,7 +172,7 @@ TEST(Calibrate, PosesHelpUntilTheRigIsGoodAndItsErrorFallsNoMore) {
   EXPECT_TRUE(more_helps(settled).empty());
   EXPECT_TRUE(more_helps({judged(0.8), judged(0.4), judged(0.2)}).empty()) << "fine enough";
   PoseJudged bare = judged(0.2);
-  bare.assessment->faults = {{"low_coverage", "", "", calib::Severity::note}};
+  bare.assessment->faults = {{calib::FaultName::low_coverage, "", "", calib::Severity::note}};
   EXPECT_EQ(more_helps({bare}), "low_coverage");
 }
 
@@ -197,4 +197,4 @@ TEST(Calibrate, TellsPlacesAsTheCameraSeesThem) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -16,7 +16,7 @@
 #include "wizard/pose_instructions.h"
 #include "wizard/sequence.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 using State = StillBoard::State;
@@ -109,7 +109,8 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   const Status taken = captured_once(again, rig, device_backend.backend(&writer));
   ASSERT_TRUE(taken) << taken.message();
   EXPECT_LT(seconds_between(before, room.rig.now()), 15);
-  const auto checked = rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
+  const auto checked =
+      apps::rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
   ASSERT_TRUE(checked) << checked.message();
   EXPECT_EQ(checked->result.verdict, calib::RigVerdict::sound);
 }
@@ -178,4 +179,4 @@ TEST(GuidedPoses, AreSeenWholeAndTiltedToAllSides) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -12,7 +12,7 @@
 #include "wizard/capture/display_latency.h"
 #include "wizard/capture/virtual_capture.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 // The bench with its board in the plan's first pose.
@@ -24,7 +24,8 @@ struct Bench {
   explicit Bench(const sim::VirtualRigOptions& options = {}) {
     const std::filesystem::path folder = test::test_folder();
     plan = load_plan(test::small_plan(folder)).value();
-    rig = std::make_unique<sim::VirtualRig>(sim::load_world(plan.world, marker_image).value(), options);
+    rig = std::make_unique<sim::VirtualRig>(sim::load_world(plan.world, tracker::marker_image).value(),
+                                            options);
     captures = planned(plan, *rig, folder / "captures").value();
     rig->remove_prototype();
     rig->place(board_object(plan.board, plan.world_from_board[0]));
@@ -128,4 +129,4 @@ TEST(DisplayLatency, SaysWhenNothingFlashes) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::wizard

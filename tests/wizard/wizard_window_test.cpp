@@ -20,7 +20,7 @@
 #include "tests/support/display.h"
 #include "wizard/capture/virtual_capture.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -60,7 +60,8 @@ WizardView a_view() {
   view.images_of = 144;
   view.judged = {{"pose00", {}, {}}, {"pose01", {}, {}}, {"pose02", 0.9, 4.2}, {"pose03", 0.31, 0.8}};
   view.advice = "More poses help: the predicted error is still falling.";
-  view.faults = {{"little_tilt", "boards were tilted by 11 degrees at most", "tilt the board more"}};
+  view.faults = {
+      {calib::FaultName::little_tilt, "boards were tilted by 11 degrees at most", "tilt the board more"}};
   return view;
 }
 
@@ -70,7 +71,7 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
     WizardView view = a_view();
     view.cameras.pop_back();
     WizardWish wish = WizardWish::none;
-    for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { wish = draw_wizard(gui, view); });
+    for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { wish = draw_wizard(gui, view); });
     EXPECT_EQ(wish, WizardWish::none);
     canvas.keep(fmt::format("wizard-{}", size.width));
     const auto count = [&](const cv::Scalar& low, const cv::Scalar& high) {
@@ -83,13 +84,13 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
     EXPECT_GT(count(green - slack, green + slack), 70 * 6) << "the corners";
     view.cameras[0].corners.clear();
     view.cameras[0].target.clear();
-    canvas.draw([&](Gui& gui) { draw_wizard(gui, view); });
+    canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view); });
     EXPECT_LT(count(amber - slack, amber + slack), 50);
     EXPECT_EQ(count(green - slack, green + slack), 0);
   }
   test::GuiCanvas canvas({1600, 1000});
   const WizardView two = a_view();
-  for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { draw_wizard(gui, two); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, two); });
   canvas.keep("wizard-two");
 }
 
@@ -119,10 +120,10 @@ WizardView an_end() {
 TEST(WizardPanel, EndsWithAVerdictAndWhereLightIsSure) {
   test::GuiCanvas canvas({1600, 1000});
   const WizardView view = an_end();
-  for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { draw_wizard(gui, view); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view); });
   canvas.keep("wizard-end");
   bool is_closed = false;
-  const auto draw = [&](Gui& gui) { is_closed |= draw_wizard(gui, view) == WizardWish::leave; };
+  const auto draw = [&](gui::Gui& gui) { is_closed |= draw_wizard(gui, view) == WizardWish::leave; };
   canvas.click({360, 970}, draw);
   EXPECT_TRUE(is_closed);
 }
@@ -135,10 +136,10 @@ TEST(WizardPanel, ScansThePrototypeWhenAsked) {
   for (WizardStep step : {WizardStep::scan, WizardStep::align, WizardStep::paint})
     view.steps[static_cast<std::size_t>(step)] = {WizardState::waits};
   view.steps[static_cast<std::size_t>(WizardStep::scan)] = {WizardState::runs, "waiting for the prototype"};
-  for (int i = 0; i < 2; ++i) canvas.draw([&](Gui& gui) { draw_wizard(gui, view); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view); });
   canvas.keep("wizard-prototype");
   std::vector<WizardWish> wishes;
-  const auto draw = [&](Gui& gui) {
+  const auto draw = [&](gui::Gui& gui) {
     const WizardWish wish = draw_wizard(gui, view);
     if (wish != WizardWish::none) wishes.push_back(wish);
   };
@@ -166,7 +167,7 @@ void leave(test::XPerson* x) {
 TEST(WizardWindow, IsLeftAndGoesOnUntilTheRigIsGood) {
   if (!test::has_x_server()) GTEST_SKIP() << "no display: WizardWindow.IsLeftAndGoesOnUntilTheRigIsGood";
   const fs::path folder = test::test_folder(), out = folder / "rig";
-  const CalibrateOptions options{.plan = test::small_plan(folder), .out = out};
+  const apps::CalibrateOptions options{.plan = test::small_plan(folder), .out = out};
   const auto with_person = [&](const std::function<void(test::XPerson*)>& acts) {
     std::thread person([&acts] {
       test::XPerson x;
@@ -175,7 +176,7 @@ TEST(WizardWindow, IsLeftAndGoesOnUntilTheRigIsGood) {
       acts(&x);
       x.close();
     });
-    const Status done = run_calibrate(options);
+    const Status done = apps::run_calibrate(options);
     person.join();
     return done;
   };
@@ -206,7 +207,7 @@ TEST(WizardWindow, TakesPosesOfDevicesAndIsLeft) {
   if (!test::has_x_server()) GTEST_SKIP() << "no display: WizardWindow.TakesPosesOfDevicesAndIsLeft";
   const fs::path folder = test::test_folder(), out = folder / "rig";
   test::BoardRoom room(load_plan(test::small_plan(folder)).value(), 0.02);
-  const CalibrateOptions options{.board = room.plan.board.text(), .out = out};
+  const apps::CalibrateOptions options{.board = room.plan.board.text(), .out = out};
   const auto captured = [&](std::size_t pose) {
     return fs::exists(out / fmt::format("captures/pose{:02}/camera0/035.png", pose));
   };
@@ -223,7 +224,7 @@ TEST(WizardWindow, TakesPosesOfDevicesAndIsLeft) {
     leave(&x);
     x.close();
   });
-  const Status left = calibrate_on(options, room.devices(), device::Desktop::open());
+  const Status left = apps::calibrate_on(options, room.devices(), device::Desktop::open());
   person.join();
   ASSERT_FALSE(left.ok());
   EXPECT_NE(left.message().find("left in pose"), std::string::npos) << left.message();
@@ -235,4 +236,4 @@ TEST(WizardWindow, TakesPosesOfDevicesAndIsLeft) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -10,7 +10,7 @@
 #include "core/result.h"
 #include "wizard/capture/display_latency.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// The devices as the wizard uses them: functions, so that virtual and real rigs work alike.
 struct WizardBackend {
@@ -33,4 +33,4 @@ struct WizardBackend {
   std::function<void(int projector, double seconds)> use_latency;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -12,7 +12,7 @@
 #include "core/config.h"
 #include "core/file.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -130,4 +130,4 @@ void remove_images(const calib::CapturedPose& pose) {
   }
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -6,7 +6,7 @@
 #include "calib/capture_set.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// The part of a plan that determines what a virtual rig captures (limn.captured_plan/1): the plan and its
 /// world, without the path from one to the other. Error: a file that cannot be read.
@@ -31,4 +31,4 @@ bool is_complete(const calib::CapturedPose& pose);
 /// Removes the images of an interrupted pose: the board may have moved since, so they cannot be used.
 void remove_images(const calib::CapturedPose& pose);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -4,7 +4,7 @@
 #include "core/config.h"
 #include "core/photometric_response.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 // Reads the code and its options. Returns the path of response.json; empty if the plan names none.
@@ -52,4 +52,4 @@ Result<Plan> load_plan(const std::filesystem::path& path) {
   return plan;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

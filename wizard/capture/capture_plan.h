@@ -10,7 +10,7 @@
 #include "core/pose.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// What to capture (limn.plan/1): the rig, the board and the code, and the board poses for a virtual rig.
 struct Plan {
@@ -27,4 +27,4 @@ struct Plan {
 /// Reads a plan; `world` is relative to the plan's folder.
 Result<Plan> load_plan(const std::filesystem::path& path);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

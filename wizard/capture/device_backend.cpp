@@ -9,7 +9,7 @@
 #include "device/open_camera.h"
 #include "device/open_display.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr double k_patience_s = 10;  // maximum wait for a camera's frame
@@ -165,7 +165,8 @@ Status DeviceBackend::show_all(const std::vector<cv::Mat>& images) {
   return {};
 }
 
-Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop) {
+Result<DeviceBackend::Devices> opened_devices(const device::Devices& named,
+                                              const Result<device::Desktop>& desktop) {
   DeviceBackend::Devices open{
       .cameras = {},
       .projectors = {},
@@ -188,4 +189,4 @@ Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result
   return open;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -14,7 +14,7 @@
 #include "wizard/capture/still_board.h"
 #include "wizard/capture/still_room.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Real cameras and projectors as the wizard's backend. Displays must be opened with a latency of 0,
 /// because the wizard measures it.
@@ -54,7 +54,8 @@ class DeviceBackend {
 
 /// Opens the cameras and projectors of a devices file. Error: one does not work, or there is not at
 /// least one of each.
-Result<DeviceBackend::Devices> opened_devices(const Devices& named, const Result<device::Desktop>& desktop);
+Result<DeviceBackend::Devices> opened_devices(const device::Devices& named,
+                                              const Result<device::Desktop>& desktop);
 
 /// The devices' names and sizes, as captures list them.
 template <typename AllDevices>
@@ -65,4 +66,4 @@ std::vector<calib::CapturedDevice> captured_devices(const AllDevices& all) {
   return list;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -6,7 +6,7 @@
 
 #include "core/image_io.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr double k_least_levels = 10;   // minimum of white minus black for a pixel that sees the light
@@ -108,4 +108,4 @@ Result<DisplayLatency> measured_latency(const FlashDevices& devices, const Flash
   return latency;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -5,7 +5,7 @@
 #include "core/frame.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// A display that flashes, and a camera that sees its light.
 struct FlashDevices {
@@ -34,4 +34,4 @@ struct DisplayLatency {
 /// half of the flashes agree.
 Result<DisplayLatency> measured_latency(const FlashDevices& devices, const FlashOptions& options = {});
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

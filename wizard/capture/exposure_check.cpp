@@ -12,7 +12,7 @@
 #include "core/median.h"
 #include "device/test_card.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr double k_lit_levels = 12;    // minimum of white minus black for a lit pixel
@@ -119,7 +119,7 @@ Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& 
     const int number = static_cast<int>(i);
     const cv::Size size(projector.width, projector.height);
     LIMN_TRY([[maybe_unused]] const auto signs,
-             grabbed(number, output_sign(size, number + 1, projector.name)));
+             grabbed(number, device::output_sign(size, number + 1, projector.name)));
     LIMN_TRY(const auto black, grabbed(number, cv::Mat(size, CV_8UC1, cv::Scalar(0))));
     LIMN_TRY(const auto white, grabbed(number, cv::Mat(size, CV_8UC1, cv::Scalar(255))));
     LIMN_TRY(const auto squared, grabbed(number, squares(size.width, size.height)));
@@ -145,4 +145,4 @@ std::vector<std::string> unseen(const std::vector<ExposureReading>& seen) {
   return sentences;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -8,7 +8,7 @@
 #include "calib/capture_set.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// How a camera sees the light of one projector.
 struct ExposureReading {
@@ -38,4 +38,4 @@ Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& 
 /// One sentence for each projector that no camera sees; empty: all are seen.
 std::vector<std::string> unseen(const std::vector<ExposureReading>& seen);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <utility>
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Runs functions of one other thread in the main thread, which owns windows and monitors.
 class MainThreadExecutor {
@@ -34,4 +34,4 @@ class MainThreadExecutor {
   const std::function<void()>* errand_ = nullptr;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -1,6 +1,6 @@
 #pragma once
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// A person's request to a running wizard.
 enum class WizardWish {
@@ -13,4 +13,4 @@ enum class WizardWish {
   leave    ///< stop; the captured images stay, and the next run continues from them
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -12,7 +12,7 @@
 #include "core/config.h"
 #include "core/file.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -209,4 +209,4 @@ Result<Rechecked> rechecked_in_place(const Rig& rig,
   return std::move(checked.rechecked);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

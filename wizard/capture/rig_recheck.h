@@ -11,7 +11,7 @@
 #include "core/rig.h"
 #include "wizard/capture/backend.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 struct Rechecked {
   calib::RigCheck result;
@@ -59,4 +59,4 @@ Result<Rechecked> rechecked_in_place(const Rig& rig,
 /// The number of images that rechecked_in_place() shows.
 int recheck_images(const Rig& rig);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

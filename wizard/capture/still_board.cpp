@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr std::size_t k_least_corners = 8;
@@ -52,4 +52,4 @@ StillBoard::State StillBoard::add_corners(const std::vector<calib::BoardCorner>&
   return is_elsewhere ? State::still : State::known;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

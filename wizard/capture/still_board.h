@@ -6,7 +6,7 @@
 #include "calib/board/board_finder.h"
 #include "core/frame.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Detects that a board is held still in a new place, from its corners in one camera's frames.
 class StillBoard {
@@ -24,4 +24,4 @@ class StillBoard {
   Stamp since_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

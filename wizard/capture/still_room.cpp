@@ -4,7 +4,7 @@
 
 #include "core/image_io.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr int k_width = 160;       // width of the small image, in which noise of single pixels averages out
@@ -28,4 +28,4 @@ bool StillRoom::add_image(const cv::Mat& image, Stamp at) {
   return seconds_between(since_, at) >= k_rest_s;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

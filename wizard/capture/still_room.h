@@ -4,7 +4,7 @@
 
 #include "core/frame.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Detects that nothing has moved in one camera's frames for a while: people have put the prototype down and
 /// stepped back.
@@ -20,4 +20,4 @@ class StillRoom {
   Stamp since_;
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -9,7 +9,7 @@
 #include "core/image_io.h"
 #include "wizard/capture/virtual_capture.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr double k_guard_s = 0.001;  // added to a measured latency
@@ -116,4 +116,4 @@ WizardBackend virtual_backend(const Plan& plan, sim::VirtualRig* rig, ImageWrite
           }};
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

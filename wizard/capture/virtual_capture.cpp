@@ -6,7 +6,7 @@
 #include "calib/response/response_shots.h"
 #include "core/log.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
@@ -120,4 +120,4 @@ Status capture_prototype(const Plan& plan,
   return done;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -10,7 +10,7 @@
 #include "sim/virtual_rig.h"
 #include "wizard/capture/capture_plan.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// The board as an object of the world, named "board".
 sim::Object board_object(const calib::Board& board, const Pose& world_from_board);
@@ -37,4 +37,4 @@ Status capture_prototype(const Plan& plan,
                          sim::VirtualRig* rig,
                          const std::filesystem::path& out);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <system_error>
 
-namespace limn::apps {
+namespace limn::wizard {
 
 Result<PixelSize> parse_pixel_size(const std::string& text) {
   PixelSize size;
@@ -16,4 +16,4 @@ Result<PixelSize> parse_pixel_size(const std::string& text) {
   return usage_error("--projector: expected a size such as 1280x800, found '{}'.", text);
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

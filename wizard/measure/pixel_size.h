@@ -4,7 +4,7 @@
 
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 struct PixelSize {
   int width = 0;
@@ -14,4 +14,4 @@ struct PixelSize {
 /// Parses a size such as "1280x800"; anything else is a usage error of --projector.
 Result<PixelSize> parse_pixel_size(const std::string& text);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

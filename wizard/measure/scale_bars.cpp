@@ -8,7 +8,7 @@
 #include "core/marker.h"
 #include "tracker/detector.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 calib::DetectedMark mark_of(const tracker::Detection& detection, int camera, int pose) {
@@ -72,4 +72,4 @@ Result<std::vector<calib::ScaleBar>> scale_bar_lengths(const calib::CaptureSet& 
   return lengths;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

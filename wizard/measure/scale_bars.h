@@ -5,7 +5,7 @@
 #include "calib/judge/scale_bar.h"
 #include "core/rig.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// The scale bars' markers as the tracker finds them, for every pose and camera: each marker in the white
 /// image of the first projector that shows it. Error: an unknown family.
@@ -17,4 +17,4 @@ Result<std::vector<calib::DetectedMark>> scale_bar_marks(const calib::CaptureSet
 Result<std::vector<calib::ScaleBar>> scale_bar_lengths(const calib::CaptureSet& captures,
                                                        const std::vector<std::string>& options);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -21,7 +21,7 @@
 #include "tracker/detector.h"
 #include "tracker/family.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 namespace fs = std::filesystem;
@@ -327,4 +327,4 @@ Result<MeshAligned> written_alignment(const AlignOptions& command) {
   return aligned;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

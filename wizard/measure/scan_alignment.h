@@ -9,7 +9,7 @@
 #include "core/result.h"
 #include "scene/mesh.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 struct AlignOptions {
   std::filesystem::path scan;  ///< PLY, or the folder of limn scan; empty: the pose comes from markers
@@ -41,4 +41,4 @@ struct MeshAligned {
 /// file is written.
 Result<MeshAligned> written_alignment(const AlignOptions& command);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -12,7 +12,7 @@
 #include "core/stopwatch.h"
 #include "scene/scan_preview.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 constexpr int k_preview_width = 1200, k_preview_height = 800;
@@ -148,4 +148,4 @@ Result<calib::Scan> written_scan(const calib::CaptureSet& captures,
   return scan;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -7,7 +7,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Measures the surface with calib::scan_captures and writes points.ply, mesh.ply (metres, the rig's world),
 /// scan.json and images into `out`. Everything is measured before the first file is written.
@@ -19,4 +19,4 @@ Result<calib::Scan> written_scan(const calib::CaptureSet& captures,
 /// The quantile `share` (0 to 1) of the points' standard deviations, mm; 0 without points.
 double stddev_mm(const calib::Scan& scan, double share);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -24,7 +24,7 @@
 #include "wizard/measure/pixel_size.h"
 #include "wizard/measure/scale_bars.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -153,4 +153,4 @@ Result<calib::Report> solved(const SolveCommandOptions& options) {
   return report;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

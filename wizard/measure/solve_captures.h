@@ -9,7 +9,7 @@
 #include "core/enum_names.h"
 #include "core/result.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// How another program stores its captures.
 enum class ImportFormat { opencv_gray };
@@ -38,4 +38,4 @@ struct SolveCommandOptions {
 /// observations.json). If the solve fails, at most report.json is written, with the faults that explain it.
 Result<calib::Report> solved(const SolveCommandOptions& options);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

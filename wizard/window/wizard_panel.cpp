@@ -10,22 +10,22 @@
 #include "wizard/capture/still_room.h"
 #include "wizard/error_colormap.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 using State = WizardState;
 
 ImU32 colour_of(State state) {
-  return state == State::done    ? colour::k_good
-         : state == State::runs  ? colour::k_blue
-         : state == State::fails ? colour::k_bad
-                                 : colour::k_quiet;
+  return state == State::done    ? gui::colour::k_good
+         : state == State::runs  ? gui::colour::k_blue
+         : state == State::fails ? gui::colour::k_bad
+                                 : gui::colour::k_quiet;
 }
 
 ImU32 colour_of(calib::Verdict worth) {
-  return worth == calib::Verdict::good     ? colour::k_good
-         : worth == calib::Verdict::usable ? colour::k_warn
-                                           : colour::k_bad;
+  return worth == calib::Verdict::good     ? gui::colour::k_good
+         : worth == calib::Verdict::usable ? gui::colour::k_warn
+                                           : gui::colour::k_bad;
 }
 
 ImU32 colour_of_mm(double mm) {
@@ -41,10 +41,10 @@ void paragraph(ImU32 colour, const std::string& text) {
   ImGui::PopStyleColor();
 }
 
-void gap(const Gui& gui) { ImGui::Dummy({0, 0.35F * gui.em()}); }
+void gap(const gui::Gui& gui) { ImGui::Dummy({0, 0.35F * gui.em()}); }
 
-void draw_steps(const Gui& gui, const WizardView& view) {
-  heading(gui, "Calibration");
+void draw_steps(const gui::Gui& gui, const WizardView& view) {
+  gui::heading(gui, "Calibration");
   gap(gui);
   static const std::array<const char*, k_wizard_steps> k_names = {
       "Devices", "Outputs", "Exposure and focus", "Display latency", "Board", "Solve",
@@ -60,16 +60,16 @@ void draw_steps(const Gui& gui, const WizardView& view) {
     else
       draw.AddCircleFilled(centre, r, colour_of(step.state));
     ImGui::Indent(1.3F * gui.em());
-    paragraph(step.state == State::waits ? colour::k_quiet : colour::k_text, k_names[i]);
+    paragraph(step.state == State::waits ? gui::colour::k_quiet : gui::colour::k_text, k_names[i]);
     if (!step.words.empty())
-      paragraph(step.state == State::fails ? colour::k_bad : colour::k_quiet, step.words);
+      paragraph(step.state == State::fails ? gui::colour::k_bad : gui::colour::k_quiet, step.words);
     ImGui::Unindent(1.3F * gui.em());
     ImGui::Dummy({0, 0.1F * gui.em()});
   }
 }
 
 // Draws the cells where boards were seen as a translucent layer, denser where they were seen more often.
-void draw_cells(const SeenCells& seen, const PlacedImage& placed, ImU32 colour) {
+void draw_cells(const SeenCells& seen, const gui::PlacedImage& placed, ImU32 colour) {
   if (seen.columns == 0 || seen.rows == 0) return;
   const float w = placed.size.x / static_cast<float>(seen.columns),
               h = placed.size.y / static_cast<float>(seen.rows);
@@ -84,7 +84,7 @@ void draw_cells(const SeenCells& seen, const PlacedImage& placed, ImU32 colour) 
   }
 }
 
-void outline(const std::vector<Eigen::Vector2d>& px, const PlacedImage& placed, ImU32 colour) {
+void outline(const std::vector<Eigen::Vector2d>& px, const gui::PlacedImage& placed, ImU32 colour) {
   std::vector<ImVec2> corners;
   for (const Eigen::Vector2d& corner : px) corners.push_back(placed.of(corner));
   ImGui::GetWindowDrawList()->AddPolyline(corners.data(), static_cast<int>(corners.size()), colour,
@@ -92,29 +92,29 @@ void outline(const std::vector<Eigen::Vector2d>& px, const PlacedImage& placed, 
 }
 
 void draw_camera(
-    Gui& gui, const WizardView& view, const WizardView::Camera& camera, ImVec2 corner, ImVec2 size) {
+    gui::Gui& gui, const WizardView& view, const WizardView::Camera& camera, ImVec2 corner, ImVec2 size) {
   ImDrawList& draw = *ImGui::GetWindowDrawList();
   const float caption = 1.35F * gui.em();
   const ImVec2 inner{corner.x, corner.y + caption};
   const ImVec2 end{corner.x + size.x, corner.y + size.y};
   draw.AddText(
-      corner, colour::k_quiet,
+      corner, gui::colour::k_quiet,
       fmt::format("{} · covered by boards: {:.0f} %", camera.name, 100 * camera.seen.share()).c_str());
   draw.AddRectFilled(inner, end, IM_COL32(12, 13, 15, 255), 3);
   ImGui::PushClipRect(inner, end, true);
   const cv::Mat empty(camera.height, camera.width, CV_8UC1, cv::Scalar(12));
-  const PlacedImage placed =
+  const gui::PlacedImage placed =
       gui.image(camera.name, camera.image.empty() ? empty : camera.image, inner, {size.x, size.y - caption});
-  draw_cells(camera.seen, placed, colour::k_blue);
-  if (!view.is_over && !camera.target.empty()) outline(camera.target, placed, colour::k_warn);
+  draw_cells(camera.seen, placed, gui::colour::k_blue);
+  if (!view.is_over && !camera.target.empty()) outline(camera.target, placed, gui::colour::k_warn);
   if (!view.is_over)
     for (const Eigen::Vector2d& px : camera.corners)
-      draw.AddCircleFilled(placed.of(px), 2.5F, colour::k_good);
+      draw.AddCircleFilled(placed.of(px), 2.5F, gui::colour::k_good);
   ImGui::PopClipRect();
 }
 
 // Draws the cameras' images side by side, as large as fits.
-void draw_cameras(Gui& gui, const WizardView& view, ImVec2 size) {
+void draw_cameras(gui::Gui& gui, const WizardView& view, ImVec2 size) {
   if (view.cameras.empty()) return;
   const float space = 0.5F * gui.em();
   const auto count = static_cast<float>(view.cameras.size());
@@ -130,7 +130,7 @@ void draw_cameras(Gui& gui, const WizardView& view, ImVec2 size) {
   ImGui::SetCursorScreenPos({at.x, at.y + size.y});
 }
 
-void draw_projectors(const Gui& gui, const WizardView& view, ImVec2 size) {
+void draw_projectors(const gui::Gui& gui, const WizardView& view, ImVec2 size) {
   if (view.projectors.empty()) return;
   const float space = 0.5F * gui.em(), caption = 1.35F * gui.em();
   const float width = (size.x + space) / static_cast<float>(view.projectors.size()) - space;
@@ -139,23 +139,23 @@ void draw_projectors(const Gui& gui, const WizardView& view, ImVec2 size) {
   for (std::size_t i = 0; i < view.projectors.size(); ++i) {
     const WizardView::Projector& projector = view.projectors[i];
     const ImVec2 corner{at.x + static_cast<float>(i) * (width + space), at.y};
-    draw.AddText(corner, colour::k_quiet,
+    draw.AddText(corner, gui::colour::k_quiet,
                  fmt::format("{} · {:.0f} %", projector.name, 100 * projector.seen.share()).c_str());
     const float scale = std::min(width / static_cast<float>(projector.width),
                                  (size.y - caption) / static_cast<float>(projector.height));
-    const PlacedImage placed{
+    const gui::PlacedImage placed{
         {corner.x, corner.y + caption},
         {scale * static_cast<float>(projector.width), scale * static_cast<float>(projector.height)},
         scale};
     draw.AddRectFilled(placed.corner, {placed.corner.x + placed.size.x, placed.corner.y + placed.size.y},
                        IM_COL32(12, 13, 15, 255), 3);
-    draw_cells(projector.seen, placed, colour::k_violet);
+    draw_cells(projector.seen, placed, gui::colour::k_violet);
   }
   ImGui::SetCursorScreenPos({at.x, at.y + size.y});
 }
 
 // Draws a curve over the poses on a logarithmic scale, and its newest value as a number.
-void draw_curve(const Gui& gui,
+void draw_curve(const gui::Gui& gui,
                 const std::string& name,
                 const std::vector<std::optional<double>>& values,
                 const std::string& unit,
@@ -172,63 +172,63 @@ void draw_curve(const Gui& gui,
   ImGui::TextUnformatted(name.c_str());
   const std::string figure = last ? fmt::format("{:.2g} {}", *last, unit) : "no rig yet";
   ImGui::SameLine(ImGui::GetWindowContentRegionMax().x - ImGui::CalcTextSize(figure.c_str()).x);
-  ImGui::PushStyleColor(ImGuiCol_Text, !last            ? colour::k_quiet
-                                       : *last <= limit ? colour::k_good
-                                                        : colour::k_warn);
+  ImGui::PushStyleColor(ImGuiCol_Text, !last            ? gui::colour::k_quiet
+                                       : *last <= limit ? gui::colour::k_good
+                                                        : gui::colour::k_warn);
   ImGui::TextUnformatted(figure.c_str());
   ImGui::PopStyleColor();
   const ImVec2 at = ImGui::GetCursorScreenPos(), size{ImGui::GetContentRegionAvail().x, height};
   ImGui::Dummy(size);
   ImDrawList& draw = *ImGui::GetWindowDrawList();
-  draw.AddRectFilled(at, {at.x + size.x, at.y + size.y}, colour::k_ground, 3);
+  draw.AddRectFilled(at, {at.x + size.x, at.y + size.y}, gui::colour::k_ground, 3);
   const double low = std::log(least / 1.3), high = std::log(most * 1.3);
   const auto y_of = [&](double value) {
     return at.y + size.y * static_cast<float>(1 - (std::log(value) - low) / (high - low));
   };
-  draw.AddLine({at.x, y_of(limit)}, {at.x + size.x, y_of(limit)}, colour::k_line, 1);
+  draw.AddLine({at.x, y_of(limit)}, {at.x + size.x, y_of(limit)}, gui::colour::k_line, 1);
   const float step = size.x / static_cast<float>(std::max<std::size_t>(9, values.size()));
   std::optional<ImVec2> before;
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!values[i] || !std::isfinite(*values[i]) || *values[i] <= 0) continue;
     const ImVec2 point{at.x + step * (static_cast<float>(i) + 0.5F), y_of(*values[i])};
-    if (before) draw.AddLine(*before, point, colour::k_blue, 2);
-    draw.AddCircleFilled(point, 4, colour::k_blue);
+    if (before) draw.AddLine(*before, point, gui::colour::k_blue, 2);
+    draw.AddCircleFilled(point, 4, gui::colour::k_blue);
     before = point;
   }
   // The label stands on the right while the curve is short, later on the left.
   const std::string words = fmt::format("good: {:g}", limit);
   const float width = ImGui::CalcTextSize(words.c_str()).x;
-  label_at({values.size() <= 5 ? at.x + size.x - width - 6 : at.x + 6,
-            std::clamp(y_of(limit) - gui.em() - 2, at.y + 1, at.y + size.y - gui.em() - 1)},
-           colour::k_quiet, words);
+  gui::label_at({values.size() <= 5 ? at.x + size.x - width - 6 : at.x + 6,
+                 std::clamp(y_of(limit) - gui.em() - 2, at.y + 1, at.y + size.y - gui.em() - 1)},
+                gui::colour::k_quiet, words);
 }
 
-void draw_progress(const Gui& gui, const WizardView& view) {
+void draw_progress(const gui::Gui& gui, const WizardView& view) {
   std::vector<std::optional<double>> px, mm;
   for (const WizardView::Judged& judged : view.judged) {
     px.push_back(judged.held_out_px);
     mm.push_back(judged.predicted_mm);
   }
   const float height = 4.2F * gui.em();
-  heading(gui, fmt::format("After {} of {} poses", view.judged.size(), view.poses));
+  gui::heading(gui, fmt::format("After {} of {} poses", view.judged.size(), view.poses));
   draw_curve(gui, "held-out error", px, "px", calib::k_good_px, height);
   draw_curve(gui, "light error (95 %)", mm, "mm", calib::k_good_mm, height);
-  if (!view.advice.empty()) paragraph(colour::k_text, view.advice);
+  if (!view.advice.empty()) paragraph(gui::colour::k_text, view.advice);
 }
 
 // Draws the histogram of each camera's grey levels under each projector's light.
-void draw_light(const Gui& gui, const WizardView& view) {
+void draw_light(const gui::Gui& gui, const WizardView& view) {
   if (view.light.empty()) return;
-  heading(gui, "Exposure");
+  gui::heading(gui, "Exposure");
   for (const ExposureReading& seen : view.light) {
-    paragraph(colour::k_quiet,
+    paragraph(gui::colour::k_quiet,
               seen.lit > 0 ? fmt::format("{}, light of {}: {:.1f} % saturated, edge blur {:.1f} px",
                                          seen.camera, seen.projector, 100 * seen.saturated, seen.blur_px)
                            : fmt::format("{} sees no light from {}", seen.camera, seen.projector));
     const ImVec2 at = ImGui::GetCursorScreenPos(), size{ImGui::GetContentRegionAvail().x, 3 * gui.em()};
     ImGui::Dummy(size);
     ImDrawList& draw = *ImGui::GetWindowDrawList();
-    draw.AddRectFilled(at, {at.x + size.x, at.y + size.y}, colour::k_ground, 3);
+    draw.AddRectFilled(at, {at.x + size.x, at.y + size.y}, gui::colour::k_ground, 3);
     constexpr std::size_t k_bars = 64;
     std::array<double, k_bars> bars{};
     for (std::size_t level = 0; level < seen.histogram.size(); ++level)
@@ -239,30 +239,30 @@ void draw_light(const Gui& gui, const WizardView& view) {
       const float x = at.x + width * static_cast<float>(i);
       const float height = (size.y - 4) * static_cast<float>(std::sqrt(bars[i] / most));
       draw.AddRectFilled({x, at.y + size.y - height}, {x + width - 1, at.y + size.y},
-                         i + 1 == k_bars ? colour::k_warn : colour::k_blue);
+                         i + 1 == k_bars ? gui::colour::k_warn : gui::colour::k_blue);
     }
   }
 }
 
-void draw_faults(const Gui& gui, const WizardView& view) {
+void draw_faults(const gui::Gui& gui, const WizardView& view) {
   if (view.faults.empty() && view.to_do.empty()) return;
-  heading(gui, !view.faults.empty()                 ? "Problems to fix"
-               : view.worth == calib::Verdict::good ? "Possible improvements"
-                                                    : "Advice");
+  gui::heading(gui, !view.faults.empty()                 ? "Problems to fix"
+                    : view.worth == calib::Verdict::good ? "Possible improvements"
+                                                         : "Advice");
   for (const calib::Fault& fault : view.faults) {
     std::string advice = fault.advice + ".";
     advice[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(advice[0])));
-    paragraph(fault.severity == calib::Severity::note    ? colour::k_text
-              : fault.severity == calib::Severity::doubt ? colour::k_warn
-                                                         : colour::k_bad,
+    paragraph(fault.severity == calib::Severity::note    ? gui::colour::k_text
+              : fault.severity == calib::Severity::doubt ? gui::colour::k_warn
+                                                         : gui::colour::k_bad,
               advice);
-    paragraph(colour::k_quiet, fault.evidence);
+    paragraph(gui::colour::k_quiet, fault.evidence);
   }
-  for (const std::string& sentence : view.to_do) paragraph(colour::k_text, sentence);
+  for (const std::string& sentence : view.to_do) paragraph(gui::colour::k_text, sentence);
 }
 
 // Draws light's predicted error over camera 0's image: the middle plane of each projector's map.
-void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
+void draw_maps(gui::Gui& gui, const WizardView& view, ImVec2 size) {
   const float space = 0.5F * gui.em(), caption = 1.35F * gui.em();
   const float width = (size.x + space) / static_cast<float>(view.maps.size()) - space;
   const ImVec2 at = ImGui::GetCursorScreenPos();
@@ -275,7 +275,7 @@ void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
     const std::string words = fmt::format("{} at {:.2f} m · at most {:.2f} mm",
                                           view.projectors[static_cast<std::size_t>(map.projector)].name,
                                           plane.depth_m, map.worst_mm());
-    draw.AddText(corner, colour::k_quiet, words.c_str());
+    draw.AddText(corner, gui::colour::k_quiet, words.c_str());
     const float cell =
         std::min(width / static_cast<float>(map.columns), (size.y - caption) / static_cast<float>(map.rows));
     for (std::size_t j = 0; j < plane.p95_mm.size(); ++j) {
@@ -290,59 +290,59 @@ void draw_maps(Gui& gui, const WizardView& view, ImVec2 size) {
   ImGui::SetCursorScreenPos({at.x, at.y + size.y});
 }
 
-void draw_images_taken(const Gui& gui, const WizardView& view) {
+void draw_images_taken(const gui::Gui& gui, const WizardView& view) {
   if (view.images_of == 0) return;
-  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, colour::k_blue);
+  ImGui::PushStyleColor(ImGuiCol_PlotHistogram, gui::colour::k_blue);
   ImGui::ProgressBar(static_cast<float>(view.images) / static_cast<float>(view.images_of),
                      {-1, 0.4F * gui.em()}, "");
   ImGui::PopStyleColor();
 }
 
 // Draws what to do next, in large letters above the images.
-void draw_task(const Gui& gui, const WizardView& view) {
+void draw_task(const gui::Gui& gui, const WizardView& view) {
   if (view.is_over) {
     const bool has_rig = view.failure.empty();
-    ImGui::PushStyleColor(ImGuiCol_Text, has_rig ? colour_of(view.worth) : colour::k_bad);
-    heading(gui, has_rig ? fmt::format("The rig is {}", calib::to_text(view.worth)) : "No rig was made");
+    ImGui::PushStyleColor(ImGuiCol_Text, has_rig ? colour_of(view.worth) : gui::colour::k_bad);
+    gui::heading(gui, has_rig ? fmt::format("The rig is {}", calib::to_text(view.worth)) : "No rig was made");
     ImGui::PopStyleColor();
-    paragraph(colour::k_text, has_rig ? view.verdict : view.failure);
+    paragraph(gui::colour::k_text, has_rig ? view.verdict : view.failure);
     const WizardView::Step& painted = view.steps[static_cast<std::size_t>(WizardStep::paint)];
-    if (painted.state == State::done) paragraph(colour::k_text, "The prototype: " + painted.words + ".");
+    if (painted.state == State::done) paragraph(gui::colour::k_text, "The prototype: " + painted.words + ".");
     return;
   }
   if (view.is_leaving) {
-    heading(gui, "Leaving");
-    paragraph(colour::k_quiet, "The captured images are kept; the same command continues from there.");
+    gui::heading(gui, "Leaving");
+    paragraph(gui::colour::k_quiet, "The captured images are kept; the same command continues from there.");
     return;
   }
   if (view.has_rig) {
-    heading(gui, view.awaits_prototype ? "Put the prototype in its working position"
-                                       : "Do not move the prototype: it is being scanned");
+    gui::heading(gui, view.awaits_prototype ? "Put the prototype in its working position"
+                                            : "Do not move the prototype: it is being scanned");
     if (view.awaits_prototype)
-      paragraph(colour::k_quiet,
+      paragraph(gui::colour::k_quiet,
                 fmt::format("Remove the board. The scan starts when nothing has moved for {:.0f} s.",
                             StillRoom::k_rest_s));
     draw_images_taken(gui, view);
     return;
   }
   if (view.place.empty()) {
-    heading(gui, "Preparing");
-    paragraph(colour::k_quiet, "The devices are checked before the first pose.");
+    gui::heading(gui, "Preparing");
+    paragraph(gui::colour::k_quiet, "The devices are checked before the first pose.");
     return;
   }
   const auto is_checked = [&](WizardStep step) {
     return view.steps.at(static_cast<std::size_t>(step)).state == State::runs;
   };
   const bool is_checking = is_checked(WizardStep::outputs) || is_checked(WizardStep::latency);
-  heading(gui, fmt::format("Pose {} of {}: {}", view.pose + 1, view.poses,
-                           is_checking         ? "hold the board still while the devices are checked"
-                           : view.is_capturing ? "hold the board still"
-                                               : "evaluating the images"));
-  paragraph(colour::k_text, "Board: " + view.place);
+  gui::heading(gui, fmt::format("Pose {} of {}: {}", view.pose + 1, view.poses,
+                                is_checking         ? "hold the board still while the devices are checked"
+                                : view.is_capturing ? "hold the board still"
+                                                    : "evaluating the images"));
+  paragraph(gui::colour::k_text, "Board: " + view.place);
   if (view.is_capturing) draw_images_taken(gui, view);
 }
 
-WizardWish draw_buttons(const Gui& gui, const WizardView& view) {
+WizardWish draw_buttons(const gui::Gui& gui, const WizardView& view) {
   WizardWish wish = WizardWish::none;
   const ImVec2 size{0, 1.9F * gui.em()};
   if (view.is_over) {
@@ -377,7 +377,7 @@ WizardWish draw_buttons(const Gui& gui, const WizardView& view) {
 
 }  // namespace
 
-WizardWish draw_wizard(Gui& gui, const WizardView& view) {
+WizardWish draw_wizard(gui::Gui& gui, const WizardView& view) {
   const ImVec2 room = ImGui::GetContentRegionAvail();
   const float space = ImGui::GetStyle().ItemSpacing.x;
   const float left = std::clamp(0.17F * room.x, 11 * gui.em(), 15 * gui.em()),
@@ -415,4 +415,4 @@ WizardWish draw_wizard(Gui& gui, const WizardView& view) {
   return wish;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

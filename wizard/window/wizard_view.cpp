@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace limn::apps {
+namespace limn::wizard {
 
 double SeenCells::share() const {
   if (counts.empty()) return 0;
@@ -23,4 +23,4 @@ SeenCells cells_of(const std::vector<Eigen::Vector2d>& px, int width, int height
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

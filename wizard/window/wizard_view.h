@@ -12,7 +12,7 @@
 #include "wizard/capture/exposure_check.h"
 #include "wizard/steps.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// Where boards were seen in an imager's image: a count for each cell of a grid over the image, row by row.
 struct SeenCells {
@@ -70,4 +70,4 @@ struct WizardView {
   std::string failure;  ///< why the run failed; empty: it did not
 };
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

@@ -9,7 +9,7 @@
 #include "wizard/window/wizard_panel.h"
 #include "wizard/window/wizard_view.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 namespace {
 
 using State = WizardState;
@@ -217,7 +217,7 @@ class Progress {
 
 }  // namespace
 
-Result<Calibrated> calibrated_in_window(GuiWindow* window,
+Result<Calibrated> calibrated_in_window(gui::GuiWindow* window,
                                         const WizardPlan& plan,
                                         const WizardBackend& backend,
                                         const std::function<void(const std::string&)>& say,
@@ -244,7 +244,7 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
     }
     const WizardView view = progress.view();
     WizardWish asked = WizardWish::none;
-    window->draw([&](Gui& gui) { asked = draw_wizard(gui, view); });
+    window->draw([&](gui::Gui& gui) { asked = draw_wizard(gui, view); });
     if (!window->is_wanted()) asked = WizardWish::leave;
     is_closed = asked == WizardWish::leave && (view.is_over || !window->is_wanted());
     if (asked != WizardWish::none && !view.is_over) progress.wish(asked);
@@ -253,4 +253,4 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
   return running.get();
 }
 
-}  // namespace limn::apps
+}  // namespace limn::wizard

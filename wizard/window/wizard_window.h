@@ -13,7 +13,7 @@
 #include "wizard/sequence.h"
 #include "wizard/steps.h"
 
-namespace limn::apps {
+namespace limn::wizard {
 
 /// What the wizard's window needs to know at the start.
 struct WizardPlan {
@@ -32,7 +32,7 @@ using WizardWork = std::function<Result<Calibrated>(const WizardBackend&, const 
 /// Runs the work in a thread of its own and shows it in the window until the person closes the window.
 /// `executor` runs what the work needs done in this thread. `say` gets the lines of text, too. `wish` gets
 /// the person's requests. If the window is closed early, the work stops, and its error is returned.
-Result<Calibrated> calibrated_in_window(GuiWindow* window,
+Result<Calibrated> calibrated_in_window(gui::GuiWindow* window,
                                         const WizardPlan& plan,
                                         const WizardBackend& backend,
                                         const std::function<void(const std::string&)>& say,
@@ -40,4 +40,4 @@ Result<Calibrated> calibrated_in_window(GuiWindow* window,
                                         MainThreadExecutor* executor,
                                         const WizardWork& work);
 
-}  // namespace limn::apps
+}  // namespace limn::wizard
