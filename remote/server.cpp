@@ -181,7 +181,7 @@ void Server::publish_state(const session::Session& session,
   if (!begun_at_) begun_at_ = at;
   if (update_providers_) update_providers_(session);
   // Files that the state mentions must be complete on the disk, since guests may request them at once.
-  if (session.is_writing()) return;
+  if (session.store().is_busy()) return;
   const auto now = Clock::now();
   const std::size_t edits = session.last_edit() ? session.last_edit()->count : 0;
   const bool is_due =

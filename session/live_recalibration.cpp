@@ -122,9 +122,7 @@ void apply_recalibration(const Result<wizard::Rechecked>& checked,
                          Stamp at,
                          Perception* perception,
                          Session* session) {
-  session->set_recalibration_progress("");
-  // A request that was made during this recalibration is served by it.
-  static_cast<void>(session->take_recalibration_request());
+  session->recalibration() = {};  // a request that was made during this recalibration is served by it
   const Status mended = mend(checked, folder, at, perception, session);
   if (!mended) session->warn(at, "repair: " + mended.message() + " The session continues with the same rig.");
 }

@@ -141,7 +141,7 @@ OperatorView OperatorConsole::view_of(const Session& session,
   if (const auto& drift = session.drift())
     for (const std::string& device : drift->devices)
       view.moved += (view.moved.empty() ? "" : " or ") + device;
-  view.recalibration_progress = session.recalibration_progress();
+  view.recalibration_progress = session.recalibration().progress;
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_between(Stamp{}, *begun_at_);

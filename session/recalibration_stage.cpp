@@ -1,5 +1,7 @@
 #include "session/recalibration_stage.h"
 
+#include <utility>
+
 #include "session/frame_loop.h"
 
 namespace limn::session {
@@ -19,11 +21,11 @@ RecalibrationStage::RecalibrationStage(Perception* perception,
 void RecalibrationStage::step(const FrameClock& clock) {
   if (!devices_) return;
   if (!recalibration_) {
-    if (session_->take_recalibration_request()) begin(clock);
+    if (std::exchange(session_->recalibration().is_requested, false)) begin(clock);
     return;
   }
   if (holds_light()) recalibration_->serve(k_errand_wait);
-  session_->set_recalibration_progress(recalibration_->words());
+  session_->recalibration().progress = recalibration_->words();
   if (const auto checked = recalibration_->take_result()) {
     pause();
     apply_recalibration(*checked, recalibration_->folder(), clock.now(), perception_, session_);

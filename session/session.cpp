@@ -5,6 +5,7 @@
 
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "session/scene_change.h"
 
 namespace limn::session {
 namespace {
@@ -15,34 +16,6 @@ namespace fs = std::filesystem;
 scene::Edit edit_of(const scene::Control& control, int steps) {
   const scene::ActionId backwards = scene::action_of(control.action).opposite.value_or(control.action);
   return scene::make_edit(steps > 0 ? control.action : backwards, control.slot);
-}
-
-std::vector<std::string> variant_names(const scene::Slot& slot) {
-  std::vector<std::string> names;
-  for (const scene::Variant& variant : slot.variants) names.push_back(variant.name);
-  return names;
-}
-
-// Whether both scenes have the same markers on the same bodies, and the same controls.
-bool is_carried_alike(const scene::Scene& a, const scene::Scene& b) {
-  const auto carriers = [](const scene::Scene& scene) {
-    std::string text;
-    for (const Body& body : scene::bodies(scene)) {
-      text += body.name + ":";
-      for (const BodyMarker& marker : body.markers) {
-        const Eigen::Quaterniond& q = marker.body_from_marker.rotation;
-        const Eigen::Vector3d& t = marker.body_from_marker.translation;
-        text += fmt::format(" {} {} {} {} {} {} {} {} {}", marker.marker.text(), marker.size_m, q.w(), q.x(),
-                            q.y(), q.z(), t.x(), t.y(), t.z());
-      }
-      text += "\n";
-    }
-    for (const scene::Control& control : scene.controls)
-      text += fmt::format("{} {} {} {}\n", control.marker.text(), scene::action_of(control.action).name,
-                          control.slot, k_gestures.text(control.gesture));
-    return text;
-  };
-  return carriers(a) == carriers(b);
 }
 
 }  // namespace
@@ -131,7 +104,7 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   std::swap(show_state_, changed);
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->record_edit(edit, source, moments_);
-  recalibration_requested_ |= command.action == scene::ActionId::repair;
+  if (command.action == scene::ActionId::repair) recalibration_.is_requested = true;
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
@@ -149,23 +122,9 @@ void Session::note_tablet(const std::string& guest,
 }
 
 Status Session::replace_scene(scene::Scene scene, Stamp at) {
-  if (!is_carried_alike(setup_.scene, scene))
-    return error(
-        "{}: expected the markers, slots and controls that the session began with, found others. Start a "
-        "new session to use them; this one continues with the parts as they were.",
-        (scene.folder / "scene.json").string());
+  LIMN_TRY_STATUS(check_same_markers(setup_.scene, scene));
   LIMN_TRY(FrameComposer composer, FrameComposer::create(scene, setup_.rig, setup_.paint));
-  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
-    const std::vector<std::string> now = variant_names(scene.slots[i]),
-                                   before = variant_names(setup_.scene.slots[i]);
-    const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
-      return std::find(names.begin(), names.end(), name) != names.end();
-    };
-    std::string& shown = show_state_.slots[i].variant;
-    for (const std::string& name : now)
-      if (!is_in(before, name)) shown = name;
-    if (!is_in(now, shown)) shown = now.front();
-  }
+  show_state_ = with_variants_of(scene, setup_.scene, std::move(show_state_));
   if (recorder_) recorder_->record_scene(scene);
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; the scene was loaded again");
   composer_.replace(std::move(composer));
@@ -189,24 +148,10 @@ Status Session::replace_rig(Rig rig, Stamp at) {
 void Session::reload_changed_scene(SceneWatch* files, Stamp at) {
   auto news = files->news();
   if (!news) return;
-  const Status shown = *news ? replace_scene_if_complete(std::move(**news), at) : Status(news->error());
-  if (shown) return;
-  const std::string what = shown.message() + " The parts stay as they were.";
-  warn(at, what);
-}
-
-// Shows the new scene, unless a variant that the session has cannot be loaded any more. A variant that never
-// could be loaded is only reported.
-Status Session::replace_scene_if_complete(SceneNews news, Stamp at) {
-  for (const scene::SkippedVariant& skipped_variants : news.skipped_variants) {
-    const scene::Slot* slot = setup_.scene.find_slot(skipped_variants.slot);
-    if (!slot) continue;
-    for (const std::string& name : variant_names(*slot))
-      if (name == skipped_variants.variant) return error("{}", skipped_variants.why);
-  }
-  LIMN_TRY_STATUS(replace_scene(std::move(news.scene), at));
-  report_skipped(news.skipped_variants, at, telemetry_);
-  return {};
+  Status done = *news ? check_all_loaded(setup_.scene, **news) : Status(news->error());
+  if (done) done = replace_scene(std::move((*news)->scene), at);
+  if (done) return report_skipped((*news)->skipped_variants, at, telemetry_);
+  warn(at, done.message() + " The parts stay as they were.");
 }
 
 FrameInput Session::predict(const FrameTimes& times) {

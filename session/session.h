@@ -26,6 +26,12 @@
 
 namespace limn::session {
 
+/// A repair (session/live_recalibration.h) that somebody asked for, and how far it is.
+struct RecalibrationStatus {
+  bool is_requested = false;
+  std::string progress;  ///< for people; empty: none is running
+};
+
 /// An edit that was applied, and who sent it.
 struct Edited {
   scene::Edit edit;
@@ -71,11 +77,9 @@ class Session {
   /// Continues with another rig of the same devices. Error: no renderer can be made for it; the session keeps
   /// its rig.
   Status replace_rig(Rig rig, Stamp at);
-  /// Whether somebody asked for a repair (session/live_recalibration.h) since the last call.
-  bool take_recalibration_request() { return std::exchange(recalibration_requested_, false); }
-  /// The progress of a repair in words; empty: none is running.
-  const std::string& recalibration_progress() const { return recalibration_progress_; }
-  void set_recalibration_progress(std::string how_far) { recalibration_progress_ = std::move(how_far); }
+  /// Requests for a repair, and its progress.
+  RecalibrationStatus& recalibration() { return recalibration_; }
+  const RecalibrationStatus& recalibration() const { return recalibration_; }
   /// The drift that was last reported.
   const std::optional<Drift>& drift() const { return drift_.reported(); }
   /// Adds a message to the telemetry and to the log.
@@ -97,10 +101,9 @@ class Session {
   void check_drift(Stamp now);
   /// Reports looks, pairings and units that could not be written.
   void report_unwritten(Stamp at);
-  /// Whether looks, pairings or units are not on the disk yet.
-  bool is_writing() const { return store_.is_busy(); }
-  /// Waits until they are on the disk.
-  void finish_writing() { store_.finish(); }
+  /// The files that the session keeps in the scene's folder.
+  ShowStore& store() { return store_; }
+  const ShowStore& store() const { return store_; }
   /// A screen's image (FrameComposer::screen): of what is chosen for all screens, or of `what`.
   cv::Mat screen() { return screen(show_state_.screen); }
   cv::Mat screen(scene::Screen what);
@@ -127,7 +130,6 @@ class Session {
  private:
   Session(
       SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder, bool keeps_looks);
-  Status replace_scene_if_complete(SceneNews news, Stamp at);
   void ask_units();
 
   SessionSetup setup_;
@@ -142,8 +144,7 @@ class Session {
   std::size_t moments_ = 0;
   DriftNotices drift_;
   SwappedCamerasCheck swapped_;
-  bool recalibration_requested_ = false;
-  std::string recalibration_progress_;
+  RecalibrationStatus recalibration_;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;
   TabletRegistry tablets_;

@@ -72,7 +72,7 @@ void SessionOutput::add_poses(const ComposedFrame& composed) {
 
 Status SessionOutput::close(Session* session, bool as_json) {
   poses_.flush();
-  session->finish_writing();
+  session->store().finish();
   session->report_unwritten(session->composed().shown_at);
   const Status recorded = recorder_ ? recorder_->finish() : Status();
   nlohmann::ordered_json json = {{"schema", "limn.live/1"}};

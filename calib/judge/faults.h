@@ -38,7 +38,7 @@ enum class FaultName {
   ambient_light,
   saturated,
   repeated_pictures,
-  known_length_not_seen,
+  scale_bar_not_seen,
   wrong_scale
 };
 /// The names in reports, which programs read; they never change.

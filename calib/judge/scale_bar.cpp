@@ -308,7 +308,7 @@ std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board)
   const ScaleBar& known = check.known;
   const std::string name = fmt::format("{} to {}", known.from, known.to);
   if (check.views.empty())
-    return Fault{FaultName::known_length_not_seen,
+    return Fault{FaultName::scale_bar_not_seen,
                  fmt::format("in no pose are both ends of {} seen by a camera and lit by a projector", name),
                  "place the bar where a camera sees both markers and a projector lights them",
                  Severity::note};

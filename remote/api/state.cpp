@@ -97,7 +97,7 @@ SessionState session_state(const session::Session& session,
   out.light = light_text(scene, show_state);
   out.viewer = show_state.viewer;
   out.follows = session.composed().follows;
-  out.repair = session.recalibration_progress();
+  out.repair = session.recalibration().progress;
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();

@@ -418,7 +418,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
   const auto unseen = wizard::solved(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
-  EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::known_length_not_seen);
+  EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::scale_bar_not_seen);
   for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
     EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
 }

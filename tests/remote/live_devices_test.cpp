@@ -350,7 +350,7 @@ void play_a_repair(Repair* repair) {
   repair->after = session->setup().rig;
   repair->camera_from_world = truth;
   repair->world_from_prototype = world_from_prototype;
-  repair->progress_at_end = session->recalibration_progress();
+  repair->progress_at_end = session->recalibration().progress;
   repair->composed = session->composed();
 }
 

@@ -420,7 +420,7 @@ TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
   ASSERT_TRUE(telemetry_->write_page(page, "x").ok());
   EXPECT_NE(read_file(page).value().find("is assumed to be in m, 149 mm long."), std::string::npos);
   edit("units", "mirror", "new part cm");
-  session_->finish_writing();
+  session_->store().finish();
   scene = scene::load_scene(folder_ / "door");
   ASSERT_TRUE(scene) << scene.message();
   EXPECT_NEAR(long_side(*scene) / guessed, 0.01, 1e-5);

@@ -1,0 +1,77 @@
+#include "session/scene_change.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/gesture.h"
+#include "scene/actions.h"
+
+namespace limn::session {
+namespace {
+
+std::vector<std::string> variant_names(const scene::Slot& slot) {
+  std::vector<std::string> names;
+  for (const scene::Variant& variant : slot.variants) names.push_back(variant.name);
+  return names;
+}
+
+// Whether both scenes have the same markers on the same bodies, and the same controls.
+bool have_same_markers(const scene::Scene& a, const scene::Scene& b) {
+  const auto carriers = [](const scene::Scene& scene) {
+    std::string text;
+    for (const Body& body : scene::bodies(scene)) {
+      text += body.name + ":";
+      for (const BodyMarker& marker : body.markers) {
+        const Eigen::Quaterniond& q = marker.body_from_marker.rotation;
+        const Eigen::Vector3d& t = marker.body_from_marker.translation;
+        text += fmt::format(" {} {} {} {} {} {} {} {} {}", marker.marker.text(), marker.size_m, q.w(), q.x(),
+                            q.y(), q.z(), t.x(), t.y(), t.z());
+      }
+      text += "\n";
+    }
+    for (const scene::Control& control : scene.controls)
+      text += fmt::format("{} {} {} {}\n", control.marker.text(), scene::action_of(control.action).name,
+                          control.slot, k_gestures.text(control.gesture));
+    return text;
+  };
+  return carriers(a) == carriers(b);
+}
+
+}  // namespace
+
+Status check_same_markers(const scene::Scene& now, const scene::Scene& next) {
+  if (have_same_markers(now, next)) return {};
+  return error(
+      "{}: expected the markers, slots and controls that the session began with, found others. Start a "
+      "new session to use them; this one continues with the parts as they were.",
+      (next.folder / "scene.json").string());
+}
+
+Status check_all_loaded(const scene::Scene& now, const SceneNews& news) {
+  for (const scene::SkippedVariant& skipped : news.skipped_variants) {
+    const scene::Slot* slot = now.find_slot(skipped.slot);
+    if (!slot) continue;
+    for (const std::string& name : variant_names(*slot))
+      if (name == skipped.variant) return error("{}", skipped.why);
+  }
+  return {};
+}
+
+scene::ShowState with_variants_of(const scene::Scene& next,
+                                  const scene::Scene& now,
+                                  scene::ShowState show_state) {
+  for (std::size_t i = 0; i < next.slots.size(); ++i) {
+    const std::vector<std::string> names = variant_names(next.slots[i]), before = variant_names(now.slots[i]);
+    const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
+      return std::find(names.begin(), names.end(), name) != names.end();
+    };
+    std::string& shown = show_state.slots[i].variant;
+    for (const std::string& name : names)
+      if (!is_in(before, name)) shown = name;
+    if (!is_in(names, shown)) shown = names.front();
+  }
+  return show_state;
+}
+
+}  // namespace limn::session
