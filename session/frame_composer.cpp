@@ -54,7 +54,7 @@ Result<FrameComposer> FrameComposer::create(const scene::Scene& scene,
                                             const Rig& rig,
                                             const ComposeOptions& options) {
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
-  return FrameComposer(std::make_unique<const Subject>(scene, rig), std::move(renderer), options);
+  return FrameComposer(std::unique_ptr<const Subject>(new Subject{scene, rig}), std::move(renderer), options);
 }
 
 FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,

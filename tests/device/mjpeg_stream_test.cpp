@@ -58,7 +58,7 @@ TEST(MjpegStream, ImagesComeOutHoweverTheBytesAreCut) {
   const std::string chunks = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n" + k_mjpeg_answer.substr(17) +
                              chunked(lengths.substr(k_mjpeg_answer.size()), 7);
   for (const std::string& bytes : {lengths, open, bare, chunks})
-    for (const std::size_t step : {1, 2, 3, 5}) EXPECT_EQ(images(bytes, step), expected) << step << bytes;
+    for (const std::size_t step : {1U, 2U, 3U, 5U}) EXPECT_EQ(images(bytes, step), expected) << step << bytes;
 }
 
 TEST(MjpegStream, OnlyTheNewestIsKeptAndItsFirstByteIsItsStamp) {
