@@ -67,7 +67,7 @@ struct OverlayTarget {
   std::size_t projector = 0;
   const Imager& imager;
   const scene::PosedScene& posed;
-  cv::Mat* image;
+  cv::Mat* image = nullptr;
   /// Split and grid depend on the surface: they need the renderer that drew the image, and the viewer for
   /// whom it was drawn. Null: they are left out.
   projector::Renderer* renderer = nullptr;

@@ -10,12 +10,13 @@ namespace limn::tracker {
 /// The black and white cells of a code as the quad shows them, border included. Rows start at the side
 /// between corners 0 and 1, columns at corner 0.
 struct SeenCells {
-  static constexpr int k_max = 9;
+  static constexpr std::size_t k_max = 9;
   int count = 0;  ///< cells along a side
   std::array<std::uint8_t, k_max * k_max> white{};
 
   bool is_white(int row, int column) const {
-    return white[static_cast<std::size_t>(row * count + column)] != 0;
+    return white[static_cast<std::size_t>(row) * static_cast<std::size_t>(count) +
+                 static_cast<std::size_t>(column)] != 0;
   }
 };
 

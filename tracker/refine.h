@@ -36,13 +36,13 @@ struct RefinedQuad {
   std::array<Eigen::Vector2d, 4> corners_px;
   std::array<Eigen::Matrix2d, 4> corner_covariance;
   /// Grey levels on both sides of each edge (side i runs from corner i to i + 1), averaged along it.
-  std::array<double, 4> outside_level, inside_level;
+  std::array<double, 4> outside_level{}, inside_level{};
   /// Width of each side's edge, as the sigma of a Gaussian in pixels.
-  std::array<double, 4> blur_px;
+  std::array<double, 4> blur_px{};
   /// False when another edge is so near to a side's that their blur overlaps: corners may be wrong.
   bool separate = true;
   /// Whether both sides are visible next to the corner.
-  std::array<bool, 4> corner_visible;
+  std::array<bool, 4> corner_visible{};
 };
 
 /// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw image and
