@@ -63,13 +63,13 @@ scene::ShowState with_variants_of(const scene::Scene& next,
                                   scene::ShowState show_state) {
   for (std::size_t i = 0; i < next.slots.size(); ++i) {
     const std::vector<std::string> names = variant_names(next.slots[i]), before = variant_names(now.slots[i]);
-    const auto is_in = [](const std::vector<std::string>& names, const std::string& name) {
-      return std::find(names.begin(), names.end(), name) != names.end();
+    const auto is_in = [](const std::string& name, const std::vector<std::string>& list) {
+      return std::find(list.begin(), list.end(), name) != list.end();
     };
     std::string& shown = show_state.slots[i].variant;
     for (const std::string& name : names)
-      if (!is_in(before, name)) shown = name;
-    if (!is_in(names, shown)) shown = names.front();
+      if (!is_in(name, before)) shown = name;
+    if (!is_in(shown, names)) shown = names.front();
   }
   return show_state;
 }

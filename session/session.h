@@ -85,7 +85,7 @@ class Session {
   /// Adds a message to the telemetry and to the log.
   void warn(Stamp at, const std::string& what);
 
-  /// Shows the scene from `files` if it has changed, as show() does. If it cannot be loaded, this is reported
+  /// Shows the scene from `files` if it has changed, as replace_scene() does. If it cannot be loaded, this is reported
   /// and the parts stay as they were.
   void reload_changed_scene(SceneWatch* files, Stamp at);
 

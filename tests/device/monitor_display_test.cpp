@@ -6,13 +6,13 @@
 #include <epoxy/gl.h>
 
 #include <chrono>
-#include <cstdlib>
 #include <opencv2/core.hpp>
 #include <thread>
 
 #include "device/gl_context.h"
 #include "device/open_display.h"
 #include "device/window.h"
+#include "tests/support/display.h"
 #include "tests/support/matchers.h"
 #include "tests/support/text.h"
 
@@ -75,7 +75,7 @@ testing::AssertionResult shows(MonitorDisplay* display, const cv::Mat& image, cv
 class OnADesktop : public testing::Test {
  protected:
   void SetUp() override {
-    if (!std::getenv("DISPLAY")) GTEST_SKIP() << "no display: MonitorDisplay";
+    if (!test::has_x_server()) GTEST_SKIP() << "no display: MonitorDisplay";
     auto opened = Desktop::open();
     ASSERT_TRUE(opened) << opened.message();
     desktop_.emplace(*opened);
