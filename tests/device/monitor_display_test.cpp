@@ -6,6 +6,7 @@
 #include <epoxy/gl.h>
 
 #include <chrono>
+#include <cstdlib>
 #include <opencv2/core.hpp>
 #include <thread>
 
