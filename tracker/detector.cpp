@@ -6,6 +6,7 @@
 #include <mutex>
 #include <utility>
 
+#include "tracker/quad_check.h"
 #include "tracker/shadow_edges.h"
 
 namespace limn::tracker {

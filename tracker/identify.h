@@ -18,14 +18,6 @@ struct Identity {
   SeenCells cells = {};          ///< the code's cells, as the quad should show them; empty for a template
 };
 
-/// Whether the inside could be a marker's, for a quad whose corners are good to a few pixels: a dark border
-/// around something that is lighter by at least min_contrast levels. Costs a tenth of refining the quad.
-bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast);
-
-/// Whether it could be a code that is partly hidden: most of the border is dark, and the cells change as
-/// often as a code's do. Rejects nine in ten quadrilaterals of clutter.
-bool may_be_covered_code(const cv::Mat& grey, const Quad& quad);
-
 /// The smallest correlation of a template with what a quad shows, and the smallest lead of its best rotation
 /// over the second best.
 constexpr double k_min_correlation = 0.65;  // the tests show the numbers of the real Hiro frame

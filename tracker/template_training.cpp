@@ -10,6 +10,7 @@
 #include "core/names.h"
 #include "tracker/candidates.h"
 #include "tracker/identify.h"
+#include "tracker/quad_check.h"
 #include "tracker/refine.h"
 #include "tracker/square_to_quad.h"
 #include "tracker/threshold.h"

@@ -1,0 +1,117 @@
+#include "tracker/quad_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
+
+#include "tracker/quad_reader.h"
+#include "tracker/quad_sampler.h"
+#include "tracker/simd.h"
+
+namespace limn::tracker {
+namespace {
+
+using identity::k_limits;
+using identity::k_middle;
+
+// The level at `rank` in ascending order. There are few levels, so all are compared with all.
+LIMN_SIMD int level_of_rank(const std::uint8_t* levels, int count, int rank) {
+  constexpr int k_lanes = 64;
+  std::array<std::uint8_t, k_lanes> padded{}, smaller{};
+  std::copy_n(levels, count, padded.begin());
+  for (int i = 0; i < count; ++i) {
+    const std::uint8_t level = levels[i];
+    for (std::size_t k = 0; k < k_lanes; ++k)
+      smaller[k] = static_cast<std::uint8_t>(smaller[k] + (level < padded[k] ? 1 : 0));
+  }
+  int highest = 0;
+#pragma omp simd reduction(max : highest)
+  for (std::size_t k = 0; k < k_lanes; ++k) {
+    const int level = smaller[k] <= rank ? padded[k] : 0;
+    highest = level > highest ? level : highest;
+  }
+  return highest;
+}
+
+// Levels of the nearest pixels at some places of a quad.
+template <std::size_t count>
+std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
+                                               const Quad& quad,
+                                               const std::array<std::array<float, count>, 2>& places) {
+  std::array<std::uint8_t, count> levels;
+  QuadSampler(grey, quad.corners_px).nearest(places[0], places[1], levels.data());
+  return levels;
+}
+
+}  // namespace
+
+bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
+  constexpr float k_inset = 0.07F;  // inside the border of every family (a ninth or more)
+  constexpr std::size_t k_border = 20, k_inside = 25;
+  static constexpr auto k_at = [] {
+    std::array<std::array<float, k_border + k_inside>, 2> at{};
+    std::size_t count = 0;
+    const auto add = [&](float x, float y) { at[0][count] = x, at[1][count++] = y; };
+    for (std::size_t i = 0; i < k_border / 4; ++i) {
+      const float along = 0.1F + 0.2F * static_cast<float>(i);
+      add(along, k_inset), add(along, 1 - k_inset), add(k_inset, along), add(1 - k_inset, along);
+    }
+    for (int row = 0; row < 5; ++row)
+      for (int column = 0; column < 5; ++column)
+        add(0.2F + 0.15F * static_cast<float>(column), 0.2F + 0.15F * static_cast<float>(row));
+    return at;
+  }();
+  const auto levels = nearest_levels(grey, quad, k_at);
+  const auto inside = levels.begin() + k_border;
+  const int lightest = *std::max_element(inside, levels.end());
+  const int middle = level_of_rank(levels.data(), k_border, k_border / 2);
+  if (lightest - middle < min_contrast) return false;
+  // Three quarters of the border must be darker than a limit halfway to the lightest inside.
+  return level_of_rank(levels.data(), k_border, k_border * 3 / 4) < middle + 0.6 * (lightest - middle);
+}
+
+bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
+  constexpr std::size_t k_along = 10, k_border = 4 * k_along;
+  constexpr int k_max_light = k_border * 7 / 40;  // codes with fingers, bites or slatted shadow have up to 5
+  constexpr std::size_t k_cells = 6;
+  // Smallest number of changes between neighbouring cells, of 60 pairs. Every code of the families that are
+  // read when covered has at least 17, and a quarter may be hidden. Two or three edges through a quad make
+  // 12.
+  constexpr int k_min_changes = 13;
+  static constexpr auto k_at = [] {
+    std::array<std::array<float, k_border + k_cells * k_cells>, 2> at{};
+    std::size_t count = 0;
+    const auto add = [&](float x, float y) { at[0][count] = x, at[1][count++] = y; };
+    for (std::size_t i = 0; i < k_along; ++i) {
+      constexpr float k_inset = 1.0F / 16;
+      const float along = k_inset + (1 - 2 * k_inset) * static_cast<float>(i) / (k_along - 1);
+      add(along, k_inset), add(along, 1 - k_inset), add(k_inset, along), add(1 - k_inset, along);
+    }
+    const auto middle = [](std::size_t i) { return (static_cast<float>(i) + 1.5F) / (k_cells + 2); };
+    for (std::size_t row = 0; row < k_cells; ++row)
+      for (std::size_t column = 0; column < k_cells; ++column) add(middle(column), middle(row));
+    return at;
+  }();
+  const auto levels = nearest_levels(grey, quad, k_at);
+  const auto border = std::span(levels).first(k_border);
+  const auto inside = std::span(levels).subspan(k_border);
+  const double dark = level_of_rank(border.data(), k_border, k_border / 2);
+  // The brightest may be glare.
+  const double light = level_of_rank(inside.data(), static_cast<int>(inside.size()), 31);
+  const double middle = dark + k_middle * (light - dark);
+  if (std::count_if(border.begin(), border.end(), [&](int level) { return level > middle; }) > k_max_light)
+    return false;
+  return std::any_of(k_limits.begin(), k_limits.end(), [&](double share) {
+    const double limit = dark + share * (light - dark);
+    int changes = 0;
+    for (std::size_t i = 0; i < inside.size(); ++i) {
+      const bool is_light = inside[i] > limit;
+      changes += i % k_cells != k_cells - 1 && is_light != (inside[i + 1] > limit);
+      changes += i + k_cells < inside.size() && is_light != (inside[i + k_cells] > limit);
+    }
+    return changes >= k_min_changes;
+  });
+}
+
+}  // namespace limn::tracker
