@@ -318,7 +318,7 @@ std::string history_html(const Report& report) {
 constexpr auto k_style = R"(
 *{box-sizing:border-box}
 body{background:#fff;color:#1d2329;max-width:1180px;padding:28px 20px 60px}
-h1{font-size:28px;margin:0 0 8px}h1 span{border-radius:6px;padding:1px 12px;color:#fff}
+h1{font-size:28px;margin:0 0 8px}h1 span.good,h1 span.usable,h1 span.reject{border-radius:6px;padding:1px 12px;color:#fff}
 h1 .good{background:#2c8a4b}h1 .usable{background:#b97a06}h1 .reject{background:#c43139}
 h2{font-size:19px;margin:40px 0 10px}.lead{color:inherit;font-size:18px;margin:0 0 6px;max-width:52em}
 .soft,figcaption,th{color:#5d6670}.soft{margin:0;font-size:14px}p{max-width:60em}
