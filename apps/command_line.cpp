@@ -31,6 +31,7 @@
 #include "apps/solve.h"
 #include "core/enum_names.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/version.h"
 
 namespace limn::apps {
@@ -47,7 +48,27 @@ int finished(const Status& status) {
 
 constexpr EnumNames<bool, 2> k_off_on{{"off", "on"}};
 
-// An option whose value is one of an enum's names. The help shows the present value as the default.
+// Accepts one of these names.
+CLI::Validator one_of(const std::vector<std::string>& names) {
+  const auto problem = [names](const std::string& text) {
+    const bool is_one = std::find(names.begin(), names.end(), text) != names.end();
+    return is_one ? std::string() : fmt::format("expected one of {}, found '{}'.", joined_names(names), text);
+  };
+  return {problem, fmt::format("{{{}}}", fmt::join(names, ","))};
+}
+
+// An option whose value is one of an enum's names.
+template <class Enum, std::size_t Count>
+CLI::Option* add_choice(CLI::App* command,
+                        const std::string& name,
+                        std::optional<Enum>* value,
+                        const EnumNames<Enum, Count>& names,
+                        const std::string& help) {
+  const auto keep = [value, &names](const std::string& text) { *value = names.find(text); };
+  return command->add_option_function<std::string>(name, keep, help)->check(one_of(names.all()));
+}
+
+// The same; the help shows the present value as the default.
 template <class Enum, std::size_t Count>
 CLI::Option* add_choice(CLI::App* command,
                         const std::string& name,
@@ -56,19 +77,8 @@ CLI::Option* add_choice(CLI::App* command,
                         const std::string& help) {
   const auto keep = [value, &names](const std::string& text) { *value = names.find(text).value(); };
   return command->add_option_function<std::string>(name, keep, help)
-      ->check(CLI::IsMember(names.all()))
+      ->check(one_of(names.all()))
       ->default_str(names.text(*value));
-}
-
-// The same for an option without a default.
-template <class Enum, std::size_t Count>
-CLI::Option* add_choice(CLI::App* command,
-                        const std::string& name,
-                        std::optional<Enum>* value,
-                        const EnumNames<Enum, Count>& names,
-                        const std::string& help) {
-  const auto keep = [value, &names](const std::string& text) { *value = names.find(text); };
-  return command->add_option_function<std::string>(name, keep, help)->check(CLI::IsMember(names.all()));
 }
 
 void add_demo(CLI::App& app, Run& run) {

@@ -393,7 +393,7 @@ void BundleAdjuster::place_points(Parameters* parameters) const {
 struct BundleAdjuster::Problem {
   BundleAdjuster& joint;
   const Noise& noise;
-  double enough;
+  double enough = 0;
   Parameters here;
   NormalEquations at_here;
   Parameters there{};
@@ -550,7 +550,7 @@ struct BundleAdjuster::BoardProblem {
 Result<Pose> BundleAdjuster::board_pose(const Parameters& at,
                                         int pose,
                                         const Noise& noise,
-                                        Pose start) const {
+                                        const Pose& start) const {
   BoardProblem problem{.joint = *this, .at = at, .pose = pose, .noise = noise, .state = start};
   problem.at_state = problem.evaluate(start);
   const LeastSquaresSummary found = limn::minimise(&problem, {.max_steps = k_most_steps,

@@ -61,7 +61,7 @@ class BundleAdjuster {
   Eigen::MatrixXd covariance(const Parameters& at, const Noise& noise);
 
   /// Pose of one placement of the board from its corners alone, everything else fixed.
-  Result<Pose> board_pose(const Parameters& at, int pose, const Noise& noise, Pose start) const;
+  Result<Pose> board_pose(const Parameters& at, int pose, const Noise& noise, const Pose& start) const;
 
  private:
   struct Group {  // observations of the same imagers and placement

@@ -111,7 +111,7 @@ Status set_material(Change* change, const MaterialOverride& material) {
 
 std::string unused_look_name(const ShowState& show_state) {
   for (int i = 1;; ++i)
-    if (const std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
+    if (std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
 }
 
 Status save_look(Change* change, const std::string& name) {

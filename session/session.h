@@ -85,8 +85,8 @@ class Session {
   /// Adds a message to the telemetry and to the log.
   void warn(Stamp at, const std::string& what);
 
-  /// Shows the scene from `files` if it has changed, as replace_scene() does. If it cannot be loaded, this is reported
-  /// and the parts stay as they were.
+  /// Shows the scene from `files` if it has changed, as replace_scene() does. If it cannot be loaded, this is
+  /// reported and the parts stay as they were.
   void reload_changed_scene(SceneWatch* files, Stamp at);
 
   /// The input for the frame with these times. Bodies are predicted to them here and nowhere else.

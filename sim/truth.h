@@ -59,8 +59,8 @@ class Truth {
  private:
   struct Part {
     scene::PosedPart posed;
-    const scene::Slot* slot;
-    const scene::Mesh* mesh;
+    const scene::Slot* slot = nullptr;
+    const scene::Mesh* mesh = nullptr;
   };
   std::vector<Hit> hits(const RayScene& scene, const Imager& imager) const;
   bool is_reached_by_projector(const Eigen::Vector3d& p_world, const Eigen::Vector3d& n_world) const;

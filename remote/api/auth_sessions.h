@@ -73,7 +73,7 @@ class AuthSessions {
 
  private:
   struct Session {
-    std::array<unsigned char, k_token_bytes> token;
+    std::array<unsigned char, k_token_bytes> token{};
     Guest guest;
   };
   struct Attempts {

@@ -287,7 +287,7 @@ cv::Mat TabletView::Impl::split_composite(const Imager& camera,
                                           const SessionSnapshot& snapshot,
                                           TabletViewMode parts,
                                           SplitDrawState* draw_state) {
-  const cv::Mat right = composite_of(camera, image, posed, snapshot, parts, &draw_state->right);
+  cv::Mat right = composite_of(camera, image, posed, snapshot, parts, &draw_state->right);
   const auto left = scene::left_of_split(*snapshot.scene, snapshot.show_state);
   const auto line = left ? session::split_line(camera, posed, prototype_box, snapshot.show_state.split_mm)
                          : std::optional<cv::Vec3d>();

@@ -126,7 +126,7 @@ TEST_F(CommandLine, WordsOutsideAClosedSetAreWrongUsageAndListTheSet) {
     words.insert(words.end(), {option, word});
     return words;
   };
-  expect(with(render, "--composite", "half"), 2, {"--composite", "half", "rest", "full"});
+  expect(with(render, "--composite", "half"), 2, {"--composite: expected one of rest, full, found 'half'"});
   expect(with(render, "--contact-shadow", "maybe"), 2, {"--contact-shadow", "on", "off"});
   expect(with(render, "--marker-light", "dim"), 2, {"--marker-light", "keep-out"});
   expect(with(render, "--compensation", "all"), 2, {"--compensation", "geometry"});

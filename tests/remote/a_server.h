@@ -102,7 +102,7 @@ class AServer : public testing::Test {
   std::string pin(Role role) const { return server_->invitation().pins[static_cast<std::size_t>(role)]; }
   std::string wrong_pin() const {
     for (int i = 0;; ++i)
-      if (const std::string pin = fmt::format("{:06}", i);
+      if (std::string pin = fmt::format("{:06}", i);
           std::count(server_->invitation().pins.begin(), server_->invitation().pins.end(), pin) == 0)
         return pin;
   }

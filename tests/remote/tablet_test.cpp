@@ -442,7 +442,7 @@ TEST(Tablet, TheNewestImageOfADeviceWinsAndAllAreAnswered) {
     const bool is_one = i % 2 == 0;
     room.tablet_view().draw_window(
         {is_one ? "tablet-one" : "tablet-other"}, is_one ? one.jpeg : other.jpeg,
-        [&answers, i](CompositeImage seen) {
+        [&answers, i](const CompositeImage& seen) {
           const std::lock_guard lock(answers.mutex);
           answers.reply[static_cast<std::size_t>(i)].push_back(json::parse(seen.json));
           ++answers.count;

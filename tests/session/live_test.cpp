@@ -171,7 +171,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   std::thread other([&] {
     auto mouth = UdpSocket::sending({"127.0.0.1", "47312"});
     const auto has_told = [&](const std::string& wanted) {
-      std::array<std::uint8_t, 2048> bytes;
+      std::array<std::uint8_t, 2048> bytes{};
       while (const auto length = told->next(bytes))
         if (std::string(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*length)).find(wanted) !=
             std::string::npos)
