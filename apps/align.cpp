@@ -12,7 +12,7 @@
 namespace limn::apps {
 
 Status run_align(const AlignCommand& command) {
-  LIMN_TRY(const wizard::MeshAligned aligned, wizard::written_alignment(command));
+  LIMN_TRY(const wizard::MeshAligned aligned, wizard::align_scan(command));
   for (const std::string& warning : aligned.warnings) log_warning("align: {}", warning);
   if (command.json) {
     LIMN_TRY(const std::string json, read_file(command.out / "align.json"));

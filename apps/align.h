@@ -9,7 +9,7 @@ struct AlignCommand : wizard::AlignOptions {
   bool json = false;  ///< Prints align.json instead of a line.
 };
 
-/// `limn align`: calls written_alignment() and prints the result.
+/// `limn align`: calls align_scan() and prints the result.
 Status run_align(const AlignCommand& command);
 
 }  // namespace limn::apps

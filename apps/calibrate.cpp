@@ -109,13 +109,13 @@ std::optional<gui::GuiWindow> window_for(const CalibrateOptions& options,
 }
 
 // Runs the wizard in a window or in the terminal, and prints the result.
-Status played(const CalibrateOptions& options,
-              const std::string& plan_json,
-              const wizard::WizardPlan& plan,
-              const wizard::WizardBackend& backend,
-              std::optional<gui::GuiWindow> window,
-              std::atomic<wizard::WizardWish>* wish,
-              wizard::MainThreadExecutor* executor) {
+Status play(const CalibrateOptions& options,
+            const std::string& plan_json,
+            const wizard::WizardPlan& plan,
+            const wizard::WizardBackend& backend,
+            std::optional<gui::GuiWindow> window,
+            std::atomic<wizard::WizardWish>* wish,
+            wizard::MainThreadExecutor* executor) {
   const Say say = [&](const std::string& line) {
     if (options.json) return log_info("{}", line);
     fmt::print("{}\n", line);
@@ -123,11 +123,11 @@ Status played(const CalibrateOptions& options,
   };
   const wizard::WizardWork work = [&](const wizard::WizardBackend& where,
                                       const wizard::WizardListener& listener) {
-    return wizard::calibrated({options.out, options.scene, options.scan, options.all}, plan_json,
-                              plan.captures, plan.places, where, listener);
+    return wizard::calibrate_rig({options.out, options.scene, options.scan, options.all}, plan_json,
+                                 plan.captures, plan.places, where, listener);
   };
   LIMN_TRY(const wizard::Calibrated done,
-           window ? wizard::calibrated_in_window(&*window, plan, backend, say, wish, executor, work)
+           window ? wizard::calibrate_in_window(&*window, plan, backend, say, wish, executor, work)
                   : work(backend, {.say = say}));
   say_end(options, done, say);
   if (options.json) fmt::print("{}", to_json(done));
@@ -142,23 +142,24 @@ Status calibrate_virtually(const CalibrateOptions& asked) {
   if (options.scene.empty() && world.scene) options.scene = world.scene->folder;
   sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
   const std::vector<Imager> cameras = rig.world().rig.cameras;
-  LIMN_TRY(const calib::CaptureSet captures, wizard::planned(plan, rig, options.out / "captures"));
+  LIMN_TRY(const calib::CaptureSet captures,
+           wizard::plan_virtual_captures(plan, rig, options.out / "captures"));
   ImageWriter writer;
   rig.remove_prototype();
   std::atomic<wizard::WizardWish> wish = wizard::WizardWish::none;
   wizard::MainThreadExecutor executor;
-  return played(options, text,
-                {captures, wizard::pose_instructions(cameras[0], plan.board, plan.world_from_board),
-                 wizard::outlines(plan.board, plan.world_from_board, cameras),
-                 devices_in_words(captures, "virtual rig: ")},
-                wizard::virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()),
-                &wish, &executor);
+  return play(options, text,
+              {captures, wizard::pose_instructions(cameras[0], plan.board, plan.world_from_board),
+               wizard::outlines(plan.board, plan.world_from_board, cameras),
+               devices_in_words(captures, "virtual rig: ")},
+              wizard::virtual_backend(plan, &rig, &writer), window_for(options, device::Desktop::open()),
+              &wish, &executor);
 }
 
 // Lets another thread use a display of the main thread.
-class ErrandDisplay : public device::Display {
+class MainThreadDisplay : public device::Display {
  public:
-  ErrandDisplay(std::unique_ptr<device::Display> display, wizard::MainThreadExecutor* executor)
+  MainThreadDisplay(std::unique_ptr<device::Display> display, wizard::MainThreadExecutor* executor)
       : display_(std::move(display)), executor_(executor) {}
   const std::string& name() const override { return display_->name(); }
   cv::Size size() const override { return display_->size(); }
@@ -178,7 +179,7 @@ Status calibrate_devices(const CalibrateOptions& options) {
     return usage_error("--board: {}", board.message());
   LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::opened_devices(named, desktop));
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, desktop));
   return calibrate_on(options, std::move(devices), desktop);
 }
 
@@ -206,13 +207,13 @@ Status calibrate_on(const CalibrateOptions& options,
   std::optional<gui::GuiWindow> window = window_for(options, desktop);
   if (window)
     for (auto& display : devices.projectors)
-      display = std::make_unique<ErrandDisplay>(std::move(display), &executor);
+      display = std::make_unique<MainThreadDisplay>(std::move(display), &executor);
   wizard::DeviceBackend device_backend(std::move(devices), *board, &wish);
   ImageWriter writer;
-  return played(options, wizard::captured_plan(options.board, options.code, captures),
-                {captures, wizard::pose_instructions(assumed, *board, poses), targets,
-                 devices_in_words(captures, ""), targets_by},
-                device_backend.backend(&writer), std::move(window), &wish, &executor);
+  return play(options, wizard::captured_plan(options.board, options.code, captures),
+              {captures, wizard::pose_instructions(assumed, *board, poses), targets,
+               devices_in_words(captures, ""), targets_by},
+              device_backend.backend(&writer), std::move(window), &wish, &executor);
 }
 
 Status run_calibrate(const CalibrateOptions& options) {

@@ -144,7 +144,7 @@ Status run_check(const CheckOptions& options) {
   std::vector<validate::CheckResult> results;
   for (const validate::Check& check : checks) {
     log_info("{} ...", check.name);
-    auto result = validate::judged(check);
+    auto result = validate::judge_check(check);
     if (!result) result = validate::CheckResult{check.name, check.about, {}, {}, 0, result.message()};
     if (!options.against.empty()) compare(options.against, &*result);
     LIMN_TRY_STATUS(write_images(*result, options.out));

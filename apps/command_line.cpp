@@ -40,7 +40,7 @@ namespace {
 // Runs the chosen command and returns the exit code.
 using Run = std::function<int()>;
 
-int finished(const Status& status) {
+int report_result(const Status& status) {
   if (status) return 0;
   log_warning("limn: {}", status.message());
   return status.error().wrong_usage ? 2 : 1;
@@ -91,7 +91,7 @@ void add_demo(CLI::App& app, Run& run) {
   command->add_flag("--window", options->window, "Also show the images in a window; Escape closes it");
   command->add_flag("--keep-captures", options->keep_captures,
                     "Keep the images of the calibration (about 1 GB)");
-  command->callback([options, &run] { run = [options] { return finished(run_demo(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_demo(*options)); }; });
 }
 
 void add_markers(CLI::App& app, Run& run) {
@@ -144,11 +144,11 @@ void add_markers(CLI::App& app, Run& run) {
       "File to write: .pdf or .svg, for a board also .png, for a body .json, for a template .patt");
   command->callback([options, learning, &run] {
     run = [options, learning] {
-      if (learning->images.empty()) return finished(run_markers(*options));
+      if (learning->images.empty()) return report_result(run_markers(*options));
       learning->family = options->family;
       learning->size_mm = options->size_mm;
       learning->out = options->out;
-      return finished(run_learn_body(*learning));
+      return report_result(run_learn_body(*learning));
     };
   });
 }
@@ -184,7 +184,7 @@ void add_detect(CLI::App& app, Run& run) {
       ->add_option("--repeat", options->repeat,
                    "Also measure the median time in ms of N detections in memory (0: do not)")
       ->check(CLI::Range(0, 1000000));
-  command->callback([options, &run] { run = [options] { return finished(run_detect(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_detect(*options)); }; });
 }
 
 void add_bench(CLI::App& app, Run& run) {
@@ -202,7 +202,7 @@ void add_bench(CLI::App& app, Run& run) {
   command->prefix_command();
   command->callback([command, options, &run] {
     options->arguments = command->remaining();
-    run = [options] { return finished(run_bench(*options)); };
+    run = [options] { return report_result(run_bench(*options)); };
   });
 }
 
@@ -212,7 +212,7 @@ void add_capture(CLI::App& app, Run& run) {
   auto options = std::make_shared<CaptureOptions>();
   command->add_option("--plan", options->plan, "Plan file (limn.plan/1)")->required();
   command->add_option("--out", options->out, "Captures folder to create")->required();
-  command->callback([options, &run] { run = [options] { return finished(run_capture(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_capture(*options)); }; });
 }
 
 void add_plan(CLI::App& app, Run& run) {
@@ -226,7 +226,7 @@ void add_plan(CLI::App& app, Run& run) {
                       "Folder for plan.html (with the rig from above and from the side) and plan.json; "
                       "without it no files are written");
   command->add_flag("--json", options->json, "Print JSON instead of a table");
-  command->callback([options, &run] { run = [options] { return finished(run_plan_rig(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_plan_rig(*options)); }; });
 }
 
 void add_patterns(CLI::App& app, Run& run) {
@@ -259,7 +259,7 @@ void add_patterns(CLI::App& app, Run& run) {
   command->add_flag("--response", options->response,
                     "Instead of a code: make the images that measure the projector's response and colour");
   command->add_option("--out", options->out, "Folder for 000.png ... and patterns.json")->required();
-  command->callback([options, &run] { run = [options] { return finished(run_patterns(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_patterns(*options)); }; });
 }
 
 void add_solve(CLI::App& app, Run& run) {
@@ -302,7 +302,7 @@ void add_solve(CLI::App& app, Run& run) {
   command->add_option("--shots", options->shots, "With --import: name pattern of the images")
       ->capture_default_str();
   command->callback(
-      [options, json, &run] { run = [options, json] { return finished(run_solve(*options, *json)); }; });
+      [options, json, &run] { run = [options, json] { return report_result(run_solve(*options, *json)); }; });
 }
 
 void add_calibrate(CLI::App& app, Run& run) {
@@ -343,7 +343,7 @@ void add_calibrate(CLI::App& app, Run& run) {
   command->add_flag("--terminal", options->terminal,
                     "Print lines in the terminal instead of opening a window");
   command->add_flag("--json", options->json, "Print JSON instead of lines and open no window");
-  command->callback([options, &run] { run = [options] { return finished(run_calibrate(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_calibrate(*options)); }; });
 }
 
 void add_scan(CLI::App& app, Run& run) {
@@ -388,7 +388,7 @@ void add_scan(CLI::App& app, Run& run) {
       ->check(CLI::Range(2, 8))
       ->capture_default_str();
   command->add_flag("--json", options->json, "Print scan.json instead of a line");
-  command->callback([options, &run] { run = [options] { return finished(run_scan(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_scan(*options)); }; });
 }
 
 void add_recheck(CLI::App& app, Run& run) {
@@ -425,7 +425,7 @@ void add_recheck(CLI::App& app, Run& run) {
                       "An earlier recheck.json; the board has not been moved since then");
   command->add_option("--out", options->out, "Rig folder to write")->required();
   command->add_flag("--json", options->json, "Print recheck.json instead of a table");
-  command->callback([options, &run] { run = [options] { return finished(run_recheck(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_recheck(*options)); }; });
 }
 
 void add_align(CLI::App& app, Run& run) {
@@ -476,7 +476,7 @@ void add_align(CLI::App& app, Run& run) {
       ->capture_default_str();
   command->add_option("--out", options->out, "Folder to write")->required();
   command->add_flag("--json", options->json, "Print align.json instead of a line");
-  command->callback([options, &run] { run = [options] { return finished(run_align(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_align(*options)); }; });
 }
 
 void add_render(CLI::App& app, Run& run) {
@@ -529,7 +529,7 @@ void add_render(CLI::App& app, Run& run) {
       command, "--black", &options->light.even_black, k_blacks,
       "Black light of the projectors: as-is, or even (overlaps of projectors do not show in the dark)");
   command->add_option("--out", options->out, "Folder for the images and coverage.json")->required();
-  command->callback([options, &run] { run = [options] { return finished(run_render(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_render(*options)); }; });
 }
 
 void add_check(CLI::App& app, Run& run) {
@@ -552,7 +552,7 @@ void add_check(CLI::App& app, Run& run) {
   command->add_option("--against", options->against,
                       "OUT folder of another run of the same checks, for instance on another machine or "
                       "driver; at most 0.1 % of an image's pixels may differ by more than two levels");
-  command->callback([options, &run] { run = [options] { return finished(run_check(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_check(*options)); }; });
 }
 
 void add_export(CLI::App& app, Run& run) {
@@ -592,8 +592,9 @@ void add_export(CLI::App& app, Run& run) {
                       "Viewer file for --profile 3d and --looks; without it the scene's viewer");
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print JSON instead of a line for each projector");
-  command->callback(
-      [options, json, &run] { run = [options, json] { return finished(run_export(*options, *json)); }; });
+  command->callback([options, json, &run] {
+    run = [options, json] { return report_result(run_export(*options, *json)); };
+  });
 }
 
 void add_import(CLI::App& app, Run& run) {
@@ -608,7 +609,7 @@ void add_import(CLI::App& app, Run& run) {
   command->add_option("--out", options->out,
                       "Rig folder to write, in the file's own coordinate frame (profile sl)");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each region");
-  command->callback([options, &run] { run = [options] { return finished(run_import(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_import(*options)); }; });
 }
 
 void add_live(CLI::App& app, Run& run) {
@@ -676,7 +677,7 @@ void add_live(CLI::App& app, Run& run) {
                    "How long unseen markers are extrapolated, in seconds")
       ->capture_default_str();
   command->add_flag("--json", options->json, "Print JSON instead of lines");
-  command->callback([options, &run] { run = [options] { return finished(run_live(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_live(*options)); }; });
 }
 
 void add_replay(CLI::App& app, Run& run) {
@@ -697,7 +698,7 @@ void add_replay(CLI::App& app, Run& run) {
   command->add_flag("--step", options->step, "Wait for the enter key before each image");
   command->add_flag("--window", options->window, "Show the screen's image in a window");
   command->add_flag("--json", options->json, "Print JSON instead of lines");
-  command->callback([options, &run] { run = [options] { return finished(run_replay(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_replay(*options)); }; });
 }
 
 void add_simulate(CLI::App& app, Run& run) {
@@ -715,7 +716,7 @@ void add_simulate(CLI::App& app, Run& run) {
                       "each slot's first variant");
   command->add_flag("--srgb", options->srgb,
                     "Encode images as sRGB for people, instead of as the world's cameras do");
-  command->callback([options, &run] { run = [options] { return finished(run_simulate(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_simulate(*options)); }; });
 }
 
 void add_doctor(CLI::App& app, Run& run) {
@@ -736,7 +737,7 @@ void add_doctor(CLI::App& app, Run& run) {
           "How long each output shows its own number and colour, in seconds (without it: not at all)")
       ->check(CLI::Range(0.0, 3600.0));
   command->add_flag("--json", options->json, "Print JSON instead of lines");
-  command->callback([options, &run] { run = [options] { return finished(run_doctor(*options)); }; });
+  command->callback([options, &run] { run = [options] { return report_result(run_doctor(*options)); }; });
 }
 
 }  // namespace
@@ -778,7 +779,7 @@ int run_command_line(int argc, char** argv) {
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), is_named)) {
     std::string known;
     for (const CLI::App* command : commands) known += " " + command->get_name();
-    return finished(usage_error("unknown command '{}'; expected one of:{}.", argv[1], known));
+    return report_result(usage_error("unknown command '{}'; expected one of:{}.", argv[1], known));
   }
   try {
     app.parse(argc, argv);
@@ -788,13 +789,13 @@ int run_command_line(int argc, char** argv) {
   try {
     return run();
   } catch (const std::filesystem::filesystem_error& problem) {
-    return finished(
+    return report_result(
         error("{}: expected a file or folder that can be opened, found: {}. Check its name and permissions.",
               problem.path1().string(), problem.code().message()));
   } catch (const std::bad_alloc&) {
-    return finished(error("expected enough memory for this work, found none left. Use smaller images."));
+    return report_result(error("expected enough memory for this work, found none left. Use smaller images."));
   } catch (const std::exception& bug) {
-    return finished(error("this is a bug in Limn, please report it: {}", bug.what()));
+    return report_result(error("this is a bug in Limn, please report it: {}", bug.what()));
   }
 }
 

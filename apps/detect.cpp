@@ -288,7 +288,7 @@ void detect_all(const DetectOptions& options,
   for (std::thread& thread : others) thread.join();
 }
 
-Status checked(const DetectOptions& options) {
+Status check_options(const DetectOptions& options) {
   if (options.images.empty()) return usage_error("limn detect: expected images, found none.");
   if (!std::isfinite(options.size_mm) || options.size_mm < 0)
     return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
@@ -301,7 +301,7 @@ Status checked(const DetectOptions& options) {
 }  // namespace
 
 Status run_detect(const DetectOptions& options) {
-  LIMN_TRY_STATUS(checked(options));
+  LIMN_TRY_STATUS(check_options(options));
   const auto families = tracker::Families::load(options.families);
   if (!families) return usage_error("--family: {}", families.message());
   std::optional<Imager> camera;

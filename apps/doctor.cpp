@@ -138,7 +138,7 @@ struct Rate {
   double per_second = 0;  // by the stamps; 0: unknown
 };
 
-Result<Rate> measured(device::CameraSource& camera) {
+Result<Rate> measure_rate(device::CameraSource& camera) {
   constexpr int k_most = 120;
   const Stamp until = shifted(Clock::now(), 1);
   Rate rate;
@@ -163,7 +163,7 @@ std::string setting_text(const device::CameraSetting& setting) {
 Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   auto camera = device::open_camera(wanted);
   if (!camera) return failed(area, wanted.name, camera.message());
-  const auto rate = measured(**camera);
+  const auto rate = measure_rate(**camera);
   if (!rate) return failed(area, wanted.name, rate.message());
   const cv::Size size = (*camera)->size();
   std::string text = fmt::format("{}: {}x{}", wanted.source, size.width, size.height);

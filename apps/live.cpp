@@ -65,36 +65,36 @@ Status check_options(const LiveOptions& options) {
 }
 
 // The virtual room's true content, and what the session knows about it.
-struct Stage {
+struct VirtualSetup {
   sim::World world;
   session::SessionSetup setup;
   std::vector<scene::SkippedVariant> skipped_variants;
 };
 
-Result<Stage> virtual_stage(const LiveOptions& options) {
-  Stage stage;
+Result<VirtualSetup> load_virtual_setup(const LiveOptions& options) {
+  VirtualSetup loaded;
   if (!options.rig.empty()) {
-    LIMN_TRY(stage.setup.rig, load_rig(options.rig));
-    LIMN_TRY(stage.setup.scene, scene::load_scene(options.scene, &stage.skipped_variants));
+    LIMN_TRY(loaded.setup.rig, load_rig(options.rig));
+    LIMN_TRY(loaded.setup.scene, scene::load_scene(options.scene, &loaded.skipped_variants));
   }
   if (options.rig.empty() || !options.world.empty()) {
     const fs::path world =
         options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
-    LIMN_TRY(stage.world, sim::load_world(world, tracker::marker_image, &stage.skipped_variants));
-    if (!stage.world.scene)
+    LIMN_TRY(loaded.world, sim::load_world(world, tracker::marker_image, &loaded.skipped_variants));
+    if (!loaded.world.scene)
       return error("{}: scene: expected a scene for a session, found none.", world.string());
   } else {
-    LIMN_TRY(stage.world, session::room_for(stage.setup.rig, stage.setup.scene));
+    LIMN_TRY(loaded.world, session::room_for(loaded.setup.rig, loaded.setup.scene));
   }
-  if (const Status coarser = scale_resolution(options.resolution, &stage.world.rig); !coarser)
+  if (const Status coarser = scale_resolution(options.resolution, &loaded.world.rig); !coarser)
     return usage_error("--resolution: {}", coarser.message());
   if (options.rig.empty()) {
-    stage.setup.rig = stage.world.rig;
-    stage.setup.scene = *stage.world.scene;
+    loaded.setup.rig = loaded.world.rig;
+    loaded.setup.scene = *loaded.world.scene;
   } else {
-    LIMN_TRY_STATUS(scale_resolution(options.resolution, &stage.setup.rig));
+    LIMN_TRY_STATUS(scale_resolution(options.resolution, &loaded.setup.rig));
   }
-  return stage;
+  return loaded;
 }
 
 // A rig is valid only for the devices that it was measured on.
@@ -129,8 +129,8 @@ Status set_up(const LiveOptions& options, session::SessionSetup* setup) {
 }
 
 // Opens the remote; null if it is not asked for.
-Result<std::unique_ptr<remote::Server>> served(const LiveOptions& options,
-                                               const session::SessionSetup& setup) {
+Result<std::unique_ptr<remote::Server>> serve(const LiveOptions& options,
+                                              const session::SessionSetup& setup) {
   if (options.serve.empty()) return std::unique_ptr<remote::Server>();
   if (!options.serve_show.empty() && !find_named(setup.rig.projectors, options.serve_show))
     return usage_error("--serve-show: expected a projector of the rig ({}), found '{}'.",
@@ -158,16 +158,16 @@ session::Session::Drawing drawing_in(std::optional<device::GlContext>* context) 
 
 // Opens everything that sessions on devices and on the virtual rig have in common, calls `play`, and closes
 // it. `setup` becomes what a replay will read.
-Status played(const LiveOptions& options,
-              session::SessionSetup setup,
-              std::span<const scene::SkippedVariant> skipped_variants,
-              const device::Desktop* desktop,
-              const std::function<Status(const session::SessionParts&, session::Keys*)>& play) {
+Status run_session(const LiveOptions& options,
+                   session::SessionSetup setup,
+                   std::span<const scene::SkippedVariant> skipped_variants,
+                   const device::Desktop* desktop,
+                   const std::function<Status(const session::SessionParts&, session::Keys*)>& play) {
   std::optional<device::GlContext> context;
   LIMN_TRY(context, device::GlContext::create());
   log_info("live: {}", context->description());
   LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to));
-  LIMN_TRY(const std::unique_ptr<remote::Server> server, served(options, setup));
+  LIMN_TRY(const std::unique_ptr<remote::Server> server, serve(options, setup));
   LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, options.record, &setup));
   session::report_skipped(skipped_variants, {}, &output.telemetry());
   LIMN_TRY(session::Perception perception, session::Perception::create(setup.scene, setup.rig, setup.watch));
@@ -190,28 +190,28 @@ Status played(const LiveOptions& options,
 Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(session::Script script, options.script.empty() ? Result<session::Script>(session::Script{})
                                                           : session::load_script(options.script));
-  LIMN_TRY(Stage stage, virtual_stage(options));
-  session::SessionSetup& setup = stage.setup;
-  LIMN_TRY_STATUS(check_fits(setup.rig, stage.world.rig));
+  LIMN_TRY(VirtualSetup loaded, load_virtual_setup(options));
+  session::SessionSetup& setup = loaded.setup;
+  LIMN_TRY_STATUS(check_fits(setup.rig, loaded.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
-  setup.paint.is_linear_camera = !stage.world.camera_effects.front().srgb;
+  setup.paint.is_linear_camera = !loaded.world.camera_effects.front().srgb;
   log_info("live: no devices are given; the session runs on a virtual rig with its own clock");
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
                                             : std::numeric_limits<double>::infinity();
-  sim::VirtualRig rig(std::move(stage.world), {.display_delay_s = session::k_virtual_display_s,
-                                               .camera_delay_s = session::k_virtual_camera_s,
-                                               .frame_period_s = options.frame_period_s,
-                                               .grab_waits_for_light = false});
+  sim::VirtualRig rig(std::move(loaded.world), {.display_delay_s = session::k_virtual_display_s,
+                                                .camera_delay_s = session::k_virtual_camera_s,
+                                                .frame_period_s = options.frame_period_s,
+                                                .grab_waits_for_light = false});
   LIMN_TRY(session::ScriptedRoom room, session::ScriptedRoom::create(std::move(script), &rig));
   std::optional<device::Desktop> desktop;
   if (options.window) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
-  return played(options, setup, stage.skipped_variants, desktop ? &*desktop : nullptr,
-                [&](const session::SessionParts& parts, session::Keys*) {
-                  return session::play_virtually(end_s, g_is_ended, &rig, &room, parts);
-                });
+  return run_session(options, setup, loaded.skipped_variants, desktop ? &*desktop : nullptr,
+                     [&](const session::SessionParts& parts, session::Keys*) {
+                       return session::play_virtually(end_s, g_is_ended, &rig, &room, parts);
+                     });
 }
 
 bool is_projector(const Rig& rig, const std::string& display) {
@@ -269,11 +269,11 @@ Status play_with_devices(const LiveOptions& options) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
   session::SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
-  return played(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
-                [&](const session::SessionParts& parts, session::Keys* keys) {
-                  open.chosen = keys;
-                  return session::play_on_devices(&open, options.seconds, g_is_ended, parts);
-                });
+  return run_session(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
+                     [&](const session::SessionParts& parts, session::Keys* keys) {
+                       open.chosen = keys;
+                       return session::play_on_devices(&open, options.seconds, g_is_ended, parts);
+                     });
 }
 
 }  // namespace

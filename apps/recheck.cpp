@@ -36,7 +36,7 @@ size_t affordable_poses(const wizard::Plan& plan, const Rig& rig) {
   return static_cast<size_t>(std::max(1.0, k_most_seconds * k_images_a_second / std::max(1, images)));
 }
 
-Status captured_virtually(const RecheckCommand& command, const fs::path& folder) {
+Status capture_in_virtual_room(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(wizard::Plan plan, wizard::load_plan(command.plan));
   plan.code_options.inverses =
       false;  // the rig is almost known, so half the images are enough, and more devices fit into the time
@@ -49,23 +49,23 @@ Status captured_virtually(const RecheckCommand& command, const fs::path& folder)
   return wizard::capture_prototype(plan, {rig.world().world_from_prototype}, &rig, folder);
 }
 
-Status captured_by_devices(const RecheckCommand& command, const fs::path& folder) {
+Status capture_with_devices(const RecheckCommand& command, const fs::path& folder) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   LIMN_TRY(const device::Devices all, device::load_devices(command.devices));
   LIMN_TRY(const device::Devices named, device::matched(all, rig));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::opened_devices(named, desktop));
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, desktop));
   LIMN_TRY(const calib::Board board, wizard::calibration_board(rig));
   const calib::CaptureSet captures = calib::plan_captures(folder, wizard::captured_devices(devices.cameras),
                                                           wizard::captured_devices(devices.projectors), board,
                                                           calib::PatternCode::gray, {.inverses = false});
-  wizard::DeviceBackend stage(std::move(devices), board, nullptr);
+  wizard::DeviceBackend device_backend(std::move(devices), board, nullptr);
   ImageWriter writer;
-  return wizard::captured_once(captures, rig, stage.backend(&writer));
+  return wizard::capture_once(captures, rig, device_backend.backend(&writer));
 }
 
 // The captures folder that the command names, or that it captures now.
-Result<fs::path> captured(const RecheckCommand& command) {
+Result<fs::path> prepare_captures(const RecheckCommand& command) {
   const int ways = !command.plan.empty() + !command.captures.empty() + !command.devices.empty();
   if (ways != 1)
     return usage_error("expected one of a captures folder, --plan and --devices, found {}.",
@@ -76,8 +76,8 @@ Result<fs::path> captured(const RecheckCommand& command) {
         "not need it.");
   if (!command.captures.empty()) return command.captures;
   const fs::path folder = command.out / "captures";
-  LIMN_TRY_STATUS(command.plan.empty() ? captured_by_devices(command, folder)
-                                       : captured_virtually(command, folder));
+  LIMN_TRY_STATUS(command.plan.empty() ? capture_with_devices(command, folder)
+                                       : capture_in_virtual_room(command, folder));
   return folder;
 }
 
@@ -112,7 +112,7 @@ void print_table(const wizard::Rechecked& checked) {
 
 Result<wizard::CheckedRig> check(const RecheckCommand& command) {
   LIMN_TRY(const Rig rig, load_rig(command.rig));
-  LIMN_TRY(const fs::path folder, captured(command));
+  LIMN_TRY(const fs::path folder, prepare_captures(command));
   LIMN_TRY(wizard::CheckedRig checked, wizard::recheck_rig(rig, folder, command.still, command.out));
   if (checked.rechecked.result.verdict != calib::RigVerdict::unexplained)
     LIMN_TRY_STATUS(write_rig(checked.rechecked.result, command));
@@ -121,7 +121,7 @@ Result<wizard::CheckedRig> check(const RecheckCommand& command) {
 
 }  // namespace
 
-Result<wizard::Rechecked> rechecked(const RecheckCommand& command) {
+Result<wizard::Rechecked> recheck(const RecheckCommand& command) {
   LIMN_TRY(wizard::CheckedRig checked, check(command));
   LIMN_TRY_STATUS(wizard::check_explained(checked.rechecked.result));
   return checked.rechecked;

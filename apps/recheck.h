@@ -26,9 +26,9 @@ struct RecheckCommand {
 /// (cameras and projectors), with a calibrated rig: has a camera or a projector moved? Writes the rig folder
 /// with the solved pose of that device, and recheck.json. Error when no single move explains the captures;
 /// then only recheck.json is written.
-Result<wizard::Rechecked> rechecked(const RecheckCommand& command);
+Result<wizard::Rechecked> recheck(const RecheckCommand& command);
 
-/// `limn recheck`: calls rechecked() and prints a table.
+/// `limn recheck`: calls recheck() and prints a table.
 Status run_recheck(const RecheckCommand& command);
 
 }  // namespace limn::apps

@@ -154,10 +154,10 @@ std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene&
 }
 
 // The only viewer, or one at the viewpoint that several share.
-Result<Imager> told_viewer(std::span<const std::filesystem::path> files,
-                           const scene::Scene& scene,
-                           const scene::PosedScene& posed,
-                           const Eigen::Vector3d& d_up_world) {
+Result<Imager> viewer_of_files(std::span<const std::filesystem::path> files,
+                               const scene::Scene& scene,
+                               const scene::PosedScene& posed,
+                               const Eigen::Vector3d& d_up_world) {
   std::vector<scene::Viewpoint> eyes;
   for (const std::filesystem::path& file : files) {
     LIMN_TRY(const Imager viewer, scene::load_viewer(file));
@@ -190,7 +190,7 @@ Result<Imager> choose_viewer(const RenderOptions& options,
   const Eigen::Vector3d d_up_world =
       rig.cameras.empty() ? Eigen::Vector3d(0, -1, 0)
                           : rig.cameras[0].imager_from_world.rotation.inverse() * Eigen::Vector3d(0, -1, 0);
-  if (!options.viewers.empty()) return told_viewer(options.viewers, scene, posed, d_up_world);
+  if (!options.viewers.empty()) return viewer_of_files(options.viewers, scene, posed, d_up_world);
   if (const auto viewer = scene::viewer_of(scene, posed, d_up_world)) return *viewer;
   if (rig.cameras.empty()) {
     return usage_error(

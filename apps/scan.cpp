@@ -26,7 +26,7 @@ calib::ScanOptions options_of(const ScanCommand& command) {
   return options;
 }
 
-Status checked(const ScanCommand& command) {
+Status check_options(const ScanCommand& command) {
   if (command.captures.empty() == command.plan.empty())
     return usage_error(
         "expected a captures folder, or --plan PLAN.json to capture on its virtual rig, found {}.",
@@ -43,7 +43,7 @@ Status checked(const ScanCommand& command) {
 }  // namespace
 
 Status run_scan(const ScanCommand& command) {
-  LIMN_TRY_STATUS(checked(command));
+  LIMN_TRY_STATUS(check_options(command));
   LIMN_TRY(const Rig rig, load_rig(command.rig));
   std::filesystem::path folder = command.captures;
   if (!command.plan.empty()) {
@@ -55,7 +55,7 @@ Status run_scan(const ScanCommand& command) {
         wizard::capture_prototype(plan, {virtual_rig.world().world_from_prototype}, &virtual_rig, folder));
   }
   LIMN_TRY(const calib::CaptureSet captures, calib::load_captures(folder));
-  LIMN_TRY(const calib::Scan scan, wizard::written_scan(captures, rig, options_of(command), command.out));
+  LIMN_TRY(const calib::Scan scan, wizard::make_scan(captures, rig, options_of(command), command.out));
   for (const std::string& warning : scan.warnings) log_warning("scan: {}", warning);
   if (command.json) {
     LIMN_TRY(const std::string json, read_file(command.out / "scan.json"));

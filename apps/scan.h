@@ -23,7 +23,7 @@ struct ScanCommand {
   bool json = false;
 };
 
-/// `limn scan`: loads captures of the scene and a calibrated rig for written_scan().
+/// `limn scan`: loads captures of the scene and a calibrated rig for make_scan().
 Status run_scan(const ScanCommand& command);
 
 }  // namespace limn::apps

@@ -45,7 +45,7 @@ void print_report(const calib::Report& report) {
 }  // namespace
 
 Status run_solve(const wizard::SolveCommandOptions& options, bool is_json) {
-  LIMN_TRY(const calib::Report report, wizard::solved(options));
+  LIMN_TRY(const calib::Report report, wizard::solve_captures(options));
   if (is_json) {
     fmt::print("{}", calib::report_json(report));
   } else {

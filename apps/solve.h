@@ -5,7 +5,7 @@
 
 namespace limn::apps {
 
-/// `limn solve`: calls solved() and prints a table. `is_json`: prints report.json instead.
+/// `limn solve`: calls solve_captures() and prints a table. `is_json`: prints report.json instead.
 Status run_solve(const wizard::SolveCommandOptions& options, bool is_json = false);
 
 }  // namespace limn::apps

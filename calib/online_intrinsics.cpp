@@ -21,7 +21,7 @@ constexpr double k_most_view_damping = 1e8;
 constexpr double k_fits_share = 0.6;     // share of a view's points that must fit for the view to be trusted
 constexpr double k_unsure_share = 0.03;  // share of the focal length; above it others are tried
 // Growth of the determinant's natural log that is worth an exchange of views.
-constexpr double k_more_told = 0.02;
+constexpr double k_more_information = 0.02;
 constexpr double k_contradiction = 30;  // squared Mahalanobis distance, 5 degrees of freedom: 1 in 70 000
 constexpr double k_median_square = 2 * std::numbers::ln2;  // median of a squared 2-vector of standard normals
 constexpr std::size_t k_least_points = 6;                  // minimum that determines more than the pose
@@ -290,7 +290,7 @@ bool OnlineIntrinsics::add(const BodyView& seen) {
     worst = std::max_element(views_.begin(), views_.end(), [&](const View& a, const View& b) {
       return log_determinant(all - a.information) < log_determinant(all - b.information);
     });
-  if (!(log_determinant(all - worst->information) > held + k_more_told)) return false;
+  if (!(log_determinant(all - worst->information) > held + k_more_information)) return false;
   *worst = std::move(view);
   return true;
 }

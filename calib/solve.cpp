@@ -38,7 +38,7 @@ double noise_of(const std::vector<Vector2d>& residuals) {
 
 // The tie point's own depth uses one degree of freedom of its observations; the median of the remaining sum
 // of squares is Wilson's and Hilferty's.
-double sighting_noise(const Observations& observations, const std::vector<Vector2d>& residuals) {
+double tie_point_noise(const Observations& observations, const std::vector<Vector2d>& residuals) {
   std::vector<double> deviations;
   for (size_t i = 0; i < residuals.size();) {
     const int point = observations.tie_observations[i].point;
@@ -148,7 +148,7 @@ Result<Solution> rounds(const Observations& observations,
     add_residuals(observations, descent.parameters, noise, &solution);
     const Noise found{noise_of(solution.corner_residuals),
                       observations.matches.empty() ? noise.match_px : noise_of(solution.match_residuals),
-                      sighting_noise(observations, solution.tie_point_residuals)};
+                      tie_point_noise(observations, solution.tie_point_residuals)};
     if (is_last) {
       solution.covariance = joint.covariance(descent.parameters, found);
       break;

@@ -6,7 +6,7 @@
 namespace limn {
 
 // An exception must not leave the thread.
-Status ImageWriter::stored(const Job& job) {
+Status ImageWriter::store_image(const Job& job) {
   try {
     return job.bytes ? write_file(job.path, *job.bytes) : write_png(job.path, job.image, {.compression = 1});
   } catch (const std::exception& problem) {
@@ -68,7 +68,7 @@ void ImageWriter::run() {
     jobs_.pop_front();
     changed_.notify_all();
     lock.unlock();
-    const Status written = stored(job);
+    const Status written = store_image(job);
     lock.lock();
     if (!written && !failure_) failure_ = written.error();
     --unwritten_;

@@ -41,7 +41,7 @@ class ImageWriter {
     cv::Mat image;
     std::shared_ptr<const std::string> bytes = {};  // if not null, written instead of `image`
   };
-  static Status stored(const Job& job);
+  static Status store_image(const Job& job);
   bool offer(Job job);
   void run();
   Status failure() const;  // the caller must hold mutex_

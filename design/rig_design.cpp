@@ -29,7 +29,7 @@ const std::array<Vector2d, 4> k_corners = {Vector2d(-1, -1), {1, -1}, {1, 1}, {-
 
 // The cosine between an imager's ray to a point and the lit side's normal; 0 if it is behind that side.
 double facing(const DescribedRig& described, const Imager& imager, const Vector3d& p_world) {
-  return std::max(0.0, described.d_front.dot((eye_of(imager) - p_world).normalized()));
+  return std::max(0.0, described.d_front.dot((optical_centre(imager) - p_world).normalized()));
 }
 
 PredictedImager imager_foreseen(const DescribedRig& described,
@@ -53,8 +53,8 @@ std::vector<PredictedPair> pairs_of(const DescribedRig& described, const std::ve
   std::vector<PredictedPair> pairs;
   for (const Imager& camera : described.rig.cameras) {
     for (const Imager& projector : described.rig.projectors) {
-      const Vector3d to_camera = (eye_of(camera) - described.p_centre).normalized();
-      const Vector3d to_projector = (eye_of(projector) - described.p_centre).normalized();
+      const Vector3d to_camera = (optical_centre(camera) - described.p_centre).normalized();
+      const Vector3d to_projector = (optical_centre(projector) - described.p_centre).normalized();
       pairs.push_back({camera.name, projector.name,
                        std::acos(std::clamp(to_camera.dot(to_projector), -1.0, 1.0)) / k_degree,
                        share_reached(points, [&](const Vector3d& p) {
@@ -103,21 +103,21 @@ std::optional<PredictedMarker> marker_of(const DescribedRig& described,
   if (!corners || !reaches(camera, described.p_centre) || facing(described, camera, described.p_centre) <= 0)
     return std::nullopt;
   const double half = described.marker_m / 2;
-  std::vector<tracker::PointObservation> sights;
+  std::vector<tracker::PointObservation> observations;
   for (std::size_t i = 0; i < 4; ++i)
-    sights.push_back({&camera.lens, camera.imager_from_world,
-                      Vector3d(k_corners[i].x() * half, k_corners[i].y() * half, 0), (*corners)[i],
-                      Eigen::Matrix2d::Identity() / (described.marker_px * described.marker_px)});
-  const auto fit = tracker::fit_pose(sights, world_from_marker);
+    observations.push_back({&camera.lens, camera.imager_from_world,
+                            Vector3d(k_corners[i].x() * half, k_corners[i].y() * half, 0), (*corners)[i],
+                            Eigen::Matrix2d::Identity() / (described.marker_px * described.marker_px)});
+  const auto fit = tracker::fit_pose(observations, world_from_marker);
   if (!fit) return std::nullopt;
   const Eigen::Matrix3d camera_from_world =
-      upright_looking_at(eye_of(camera), described.p_centre).rotation_matrix();
+      upright_looking_at(optical_centre(camera), described.p_centre).rotation_matrix();
   const Eigen::Matrix3d place =
       camera_from_world * fit->covariance.bottomRightCorner<3, 3>() * camera_from_world.transpose();
   const std::vector<Eigen::Matrix2d> across = {place.topLeftCorner<2, 2>()};
   const Vector3d p_farthest =
       *std::max_element(points.begin(), points.end(), [&](const Vector3d& a, const Vector3d& b) {
-        return (a - eye_of(camera)).squaredNorm() < (b - eye_of(camera)).squaredNorm();
+        return (a - optical_centre(camera)).squaredNorm() < (b - optical_centre(camera)).squaredNorm();
       });
   const auto farthest = corners_of(described, camera, marker_at(described, p_farthest));
   return PredictedMarker{.camera = camera.name,

@@ -7,7 +7,7 @@ namespace limn::design {
 
 using Eigen::Vector3d;
 
-Vector3d eye_of(const Imager& imager) { return imager.imager_from_world.inverse().translation; }
+Vector3d optical_centre(const Imager& imager) { return imager.imager_from_world.inverse().translation; }
 
 Pose upright_looking_at(const Vector3d& p_eye, const Vector3d& p_target) {
   const bool is_plumb = std::abs((p_target - p_eye).normalized().z()) > 0.999;

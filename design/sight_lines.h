@@ -11,7 +11,7 @@ namespace limn::design {
 constexpr double k_degree = std::numbers::pi / 180;
 
 /// Position of an imager, world frame.
-Eigen::Vector3d eye_of(const Imager& imager);
+Eigen::Vector3d optical_centre(const Imager& imager);
 
 /// Pose (imager_from_world) of an imager at p_eye that points at p_target, with the world's z axis up in the
 /// image. If it points straight down or up, the world's y axis (away from the front) is up instead.

@@ -35,8 +35,8 @@ double spread(int i, int base) {
 // Board poses all over the volume, facing the mean position of all devices and tilted to all sides in turn.
 std::vector<Pose> board_places(const DescribedRig& described) {
   Vector3d p_devices = Vector3d::Zero();
-  for (const Imager& camera : described.rig.cameras) p_devices += eye_of(camera);
-  for (const Imager& projector : described.rig.projectors) p_devices += eye_of(projector);
+  for (const Imager& camera : described.rig.cameras) p_devices += optical_centre(camera);
+  for (const Imager& projector : described.rig.projectors) p_devices += optical_centre(projector);
   p_devices /= static_cast<double>(described.rig.cameras.size() + described.rig.projectors.size());
   const Pose middle(Eigen::Quaterniond::Identity(),
                     {-described.board.width_m() / 2, -described.board.height_m() / 2, 0});
@@ -55,7 +55,7 @@ std::vector<Pose> board_places(const DescribedRig& described) {
 }
 
 bool faces(const Imager& imager, const Pose& world_from_board, const Vector3d& p_world) {
-  const Vector3d d = (p_world - eye_of(imager)).normalized();
+  const Vector3d d = (p_world - optical_centre(imager)).normalized();
   return d.dot(world_from_board.rotation * Vector3d::UnitZ()) > k_least_facing;
 }
 

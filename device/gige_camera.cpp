@@ -306,7 +306,7 @@ std::optional<Frame> GigeCamera::Impl::grabbed(ArvBuffer* buffer) {
 
 Result<Frame> GigeCamera::Impl::next() {
   const Stamp deadline = shifted(Clock::now(), options.limit_s);
-  bool heard = false;
+  bool received = false;
   while (Clock::now() < deadline) {
     if (!session) {
       if (!retry.wait(deadline) || !may_begin(deadline)) break;
@@ -320,12 +320,12 @@ Result<Frame> GigeCamera::Impl::next() {
       ++openings;
     }
     if (ArvBuffer* buffer = newest(deadline)) {
-      heard = true;
+      received = true;
       if (auto frame = grabbed(buffer)) {
         retry.note_success();
         return std::move(*frame);
       }
-    } else if (!heard) {
+    } else if (!received) {
       end(true);
       retry.note_failure("it sends no frame. Check its cable, trigger mode and the firewall.");
     }

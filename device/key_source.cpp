@@ -31,7 +31,7 @@ std::optional<int> code_of(int key) {
   return std::nullopt;
 }
 
-Result<int> opened(const KeysConfig& config) {
+Result<int> open_keys(const KeysConfig& config) {
   const int file = ::open(config.path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   if (file < 0) {
     const char* advice = errno == EACCES ? "Add yourself to the group `input`."
@@ -47,7 +47,7 @@ Result<int> opened(const KeysConfig& config) {
 }  // namespace
 
 Result<KeySource> KeySource::open(const KeysConfig& config) {
-  LIMN_TRY(const int file, opened(config));
+  LIMN_TRY(const int file, open_keys(config));
   return KeySource(config, file);
 }
 
@@ -68,7 +68,7 @@ Result<std::vector<int>> KeySource::poll_pressed_keys() {
   if (file_ < 0) {
     if (now - tried_at_ < k_retry) return error("{}", why_gone_);
     tried_at_ = now;
-    const Result<int> again = opened(config_);
+    const Result<int> again = open_keys(config_);
     if (!again) {
       why_gone_ = again.message();
       return again.error();

@@ -58,7 +58,7 @@ struct MjpegCamera::Impl {
 
   Status connect(Stamp deadline);
   void disconnect(const std::string& why);
-  Status read_waiting(bool* heard);
+  Status read_waiting(bool* has_received);
   std::optional<Frame> decoded(MjpegPart part);
   Result<Frame> next();
 };
@@ -82,13 +82,13 @@ void MjpegCamera::Impl::disconnect(const std::string& why) {
   retry.note_failure(why);
 }
 
-// Feeds everything that has arrived to the stream; sets `heard` if there was anything.
-Status MjpegCamera::Impl::read_waiting(bool* heard) {
+// Feeds everything that has arrived to the stream; sets `has_received` if there was anything.
+Status MjpegCamera::Impl::read_waiting(bool* has_received) {
   const Stamp until = shifted(Clock::now(), k_draining_s);
   do {
     LIMN_TRY(const Socket::Received received, connection->socket.receive());
     if (received.bytes.empty()) return {};
-    *heard = true;
+    *has_received = true;
     LIMN_TRY_STATUS(connection->stream.feed(received.bytes, received.arrived_at));
   } while (Clock::now() < until);
   return {};
@@ -110,14 +110,14 @@ std::optional<Frame> MjpegCamera::Impl::decoded(MjpegPart part) {
 
 Result<Frame> MjpegCamera::Impl::next() {
   const Stamp deadline = shifted(Clock::now(), options.limit_s);
-  bool heard = false;
+  bool has_received = false;
   while (Clock::now() < deadline) {
     if (!connection) {
       if (!retry.wait(deadline)) break;
       if (const Status done = connect(deadline); !done) disconnect(done.message());
       continue;
     }
-    const Status read = read_waiting(&heard);
+    const Status read = read_waiting(&has_received);
     if (auto part = connection->stream.take_newest()) {
       if (auto frame = decoded(std::move(*part))) {
         if (!read) disconnect(read.message());
@@ -126,7 +126,7 @@ Result<Frame> MjpegCamera::Impl::next() {
     }
     if (!read) {
       disconnect(read.message());
-    } else if (!connection->socket.wait(deadline) && !heard) {
+    } else if (!connection->socket.wait(deadline) && !has_received) {
       disconnect("the server is silent.");  // for example an unplugged cable
     }
   }

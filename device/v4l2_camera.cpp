@@ -82,7 +82,7 @@ Error refused(const char* what, int problem) {
   return error("{} fails: {}. {}", what, std::strerror(problem), advice_for(problem));
 }
 
-Result<Device> opened(const std::string& path, const V4l2System& system) {
+Result<Device> open_device(const std::string& path, const V4l2System& system) {
   const int fd = system.open(path);
   if (fd < 0) return refused("opening it", errno);
   return Device(&system, fd);
@@ -256,7 +256,7 @@ std::size_t least_bytes(const v4l2_pix_format& format) {
   return std::max<std::size_t>(format.bytesperline, row) * (format.height - 1) + row;
 }
 
-Result<Buffers> started(const Device& device, const v4l2_pix_format& format) {
+Result<Buffers> start_streaming(const Device& device, const v4l2_pix_format& format) {
   v4l2_requestbuffers request{};
   request.count = k_buffers;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -293,7 +293,7 @@ Result<Session> begun(const std::string& path,
                       const V4l2System& system,
                       const V4l2CameraOptions& options,
                       cv::Size size) {
-  LIMN_TRY(Device device, opened(path, system));
+  LIMN_TRY(Device device, open_device(path, system));
   LIMN_TRY(const v4l2_capability able, capability(device));
   if (!captures_video(able))
     return error(
@@ -302,7 +302,7 @@ Result<Session> begun(const std::string& path,
   LIMN_TRY(const std::uint32_t wanted, chosen_format(device, options.grey));
   LIMN_TRY(const v4l2_pix_format format, set_format(device, wanted, size));
   std::vector<CameraSetting> settings = locked(device, options.sensor);
-  LIMN_TRY(Buffers buffers, started(device, format));
+  LIMN_TRY(Buffers buffers, start_streaming(device, format));
   return Session{std::move(device), format, std::move(settings), std::move(buffers)};
 }
 
@@ -366,7 +366,7 @@ struct V4l2Camera::Impl {
   Retry retry;
   std::optional<Session> session;
   Stamp last_stamp;
-  bool heard = false;  // a frame came since next() was called
+  bool received = false;  // a frame came since next() was called
   long openings = 0, dropped = 0, damaged = 0, odd_stamps = 0;
 
   Status dequeue(v4l2_buffer* buffer, bool* got);
@@ -404,7 +404,7 @@ Result<std::optional<v4l2_buffer>> V4l2Camera::Impl::newest(Stamp deadline) {
     const double left_s = std::max(0.0, seconds_between(Clock::now(), deadline));
     std::optional<v4l2_buffer> kept;
     if (!system.wait(session->device.fd(), left_s)) {
-      if (heard) return kept;
+      if (received) return kept;
       return error("it sends no frame. {}", advice_for(0));
     }
     std::size_t filled = 0;
@@ -417,7 +417,7 @@ Result<std::optional<v4l2_buffer>> V4l2Camera::Impl::newest(Stamp deadline) {
         LIMN_TRY_STATUS(drop(&*kept));
       }
       kept = buffer;
-      heard = true;
+      received = true;
       ++filled;
     } while (system.wait(session->device.fd(), 0));
     if (filled < session->buffers.maps().size() || Clock::now() >= deadline) return kept;
@@ -471,7 +471,7 @@ Result<std::optional<Frame>> V4l2Camera::Impl::grabbed(Stamp deadline) {
 
 Result<Frame> V4l2Camera::Impl::next() {
   const Stamp deadline = shifted(Clock::now(), options.limit_s);
-  heard = false;
+  received = false;
   while (Clock::now() < deadline) {
     if (!session) {
       if (!retry.wait(deadline)) break;

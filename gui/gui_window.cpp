@@ -44,19 +44,19 @@ GuiWindow::~GuiWindow() {
 }
 
 std::vector<int> GuiWindow::pressed_keys() {
-  const device::WindowInput news = window_.input();
-  is_touched_ |= !news.keys.empty() || news.wheel != 0 || news.pointer != input_.pointer;
-  input_.pointer = news.pointer;
-  for (std::size_t i = 0; i < news.buttons.size(); ++i) {
-    is_touched_ |= news.buttons[i] != input_.buttons[i];
-    input_.buttons[i] |= news.buttons[i];
+  const device::WindowInput now = window_.input();
+  is_touched_ |= !now.keys.empty() || now.wheel != 0 || now.pointer != input_.pointer;
+  input_.pointer = now.pointer;
+  for (std::size_t i = 0; i < now.buttons.size(); ++i) {
+    is_touched_ |= now.buttons[i] != input_.buttons[i];
+    input_.buttons[i] |= now.buttons[i];
   }
-  input_.wheel += news.wheel;
-  input_.keys.insert(input_.keys.end(), news.keys.begin(), news.keys.end());
-  input_.characters.insert(input_.characters.end(), news.characters.begin(), news.characters.end());
+  input_.wheel += now.wheel;
+  input_.keys.insert(input_.keys.end(), now.keys.begin(), now.keys.end());
+  input_.characters.insert(input_.characters.end(), now.characters.begin(), now.characters.end());
   std::vector<int> pressed;
   if (!gui_->is_typing())
-    for (const device::WindowInput::Key& key : news.keys)
+    for (const device::WindowInput::Key& key : now.keys)
       if (key.is_down) pressed.push_back(key.code);
   return pressed;
 }

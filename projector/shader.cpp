@@ -89,16 +89,16 @@ Result<Program> Program::link(const std::string& vertex_file, const std::string&
   std::array<GlName, 2> shaders;
   LIMN_TRY(shaders[0], compile(GL_VERTEX_SHADER, vertex_file));
   LIMN_TRY(shaders[1], compile(GL_FRAGMENT_SHADER, fragment_file));
-  return linked(shaders, vertex_file + " and " + fragment_file);
+  return link(shaders, vertex_file + " and " + fragment_file);
 }
 
 Result<Program> Program::link_compute(const std::string& file, Defines defines) {
   std::array<GlName, 1> shaders;
   LIMN_TRY(shaders[0], compile(GL_COMPUTE_SHADER, file, defines));
-  return linked(shaders, file);
+  return link(shaders, file);
 }
 
-Result<Program> Program::linked(std::span<const GlName> shaders, const std::string& files) {
+Result<Program> Program::link(std::span<const GlName> shaders, const std::string& files) {
   Program program;
   program.name_ = GlName(glCreateProgram(), [](GLuint n) { glDeleteProgram(n); });
   for (const GlName& shader : shaders) glAttachShader(*program.name_, *shader);

@@ -68,7 +68,7 @@ class Program {
   };
   // -1 for a uniform that this program does not use; GL ignores setting it.
   GLint location_of(std::string_view uniform) const;
-  static Result<Program> linked(std::span<const GlName> shaders, const std::string& files);
+  static Result<Program> link(std::span<const GlName> shaders, const std::string& files);
   GlName name_;
   std::vector<Uniform> uniforms_;  // sorted by name
 };

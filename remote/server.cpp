@@ -194,29 +194,29 @@ void Server::publish_state(const session::Session& session,
     scene_ = std::make_shared<const scene::Scene>(session.setup().scene);
     scenes_ = session.scenes();
   }
-  hand_over_news({session_state(session, telemetry, health, *begun_at_), session.composed().projectors,
-                  session.show_state().looks, scene_, std::exchange(edit_results_, {})});
+  hand_over_update({session_state(session, telemetry, health, *begun_at_), session.composed().projectors,
+                    session.show_state().looks, scene_, std::exchange(edit_results_, {})});
 }
 
-// Hands news to the network's thread. News that it has not taken yet are replaced; their edit results are
-// kept.
-void Server::hand_over_news(SessionNews news) {
+// Hands an update to the network's thread. An update that it has not taken yet is replaced; its edit results
+// are kept.
+void Server::hand_over_update(SessionUpdate update) {
   {
     const std::lock_guard lock(mutex_);
-    if (news_)
-      news.edit_results.insert(news.edit_results.begin(), news_->edit_results.begin(),
-                               news_->edit_results.end());
-    news_ = std::move(news);
-    if (std::exchange(is_news_posted_, true)) return;
+    if (update_)
+      update.edit_results.insert(update.edit_results.begin(), update_->edit_results.begin(),
+                                 update_->edit_results.end());
+    update_ = std::move(update);
+    if (std::exchange(is_update_posted_, true)) return;
   }
   network_->post([this] {
-    std::optional<SessionNews> newest;
+    std::optional<SessionUpdate> newest;
     {
       const std::lock_guard lock(mutex_);
-      newest = std::exchange(news_, std::nullopt);
-      is_news_posted_ = false;
+      newest = std::exchange(update_, std::nullopt);
+      is_update_posted_ = false;
     }
-    if (newest) handler_->update_news(std::move(*newest));
+    if (newest) handler_->apply_update(std::move(*newest));
   });
 }
 

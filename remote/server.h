@@ -81,7 +81,7 @@ class Server : public session::SessionClient, public session::RemoteLink {
   RequestHandler::Setup handler_setup(const std::string& host, const std::optional<Certificate>& certificate);
   void invite_guests(const std::string& host, const std::optional<Certificate>& certificate);
   std::optional<EditRequest> next_edit_request();
-  void hand_over_news(SessionNews news);
+  void hand_over_update(SessionUpdate update);
 
   session::Invitation invitation_;
   WorkerThread worker_;
@@ -92,8 +92,8 @@ class Server : public session::SessionClient, public session::RemoteLink {
   std::mutex mutex_;
   std::deque<EditRequest> edit_requests_;                             // from the network to the session
   std::map<std::string, std::optional<Eigen::Vector3d>> viewpoints_;  // likewise, the newest of each guest
-  std::optional<SessionNews> news_;                                   // from the session to the network
-  bool is_news_posted_ = false;
+  std::optional<SessionUpdate> update_;                               // from the session to the network
+  bool is_update_posted_ = false;
 
   // Used by the session's thread alone.
   std::vector<EditResult> edit_results_;

@@ -211,7 +211,7 @@ void leave_out_maps(const fs::path& path, Mesh* mesh) {
       path.string());
 }
 
-Status checked(const Soup& soup, const fs::path& path) {
+Status check_mesh(const Soup& soup, const fs::path& path) {
   for (std::size_t c = 0; c < soup.corners.size(); ++c) {
     const Corner& corner = soup.corners[c];
     if (corner.position.allFinite() && corner.uv.allFinite()) continue;
@@ -317,7 +317,7 @@ Result<Mesh> load_mesh(const fs::path& path, LengthUnit units) {
   append(*scene, *scene->mRootNode, Eigen::Matrix4f::Identity(), static_cast<float>(metres_per_unit(units)),
          &soup);
   if (soup.triangle_materials.empty()) return no_triangles(path);
-  LIMN_TRY_STATUS(checked(soup, path));
+  LIMN_TRY_STATUS(check_mesh(soup, path));
   if (extension(path) == ".stl") drop_normals(&soup);
   const bool broken_normal = std::any_of(soup.corners.begin(), soup.corners.end(), [](Corner& corner) {
     if (!corner.normal.allFinite()) corner.normal.setZero();

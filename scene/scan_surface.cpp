@@ -246,7 +246,7 @@ void skip(const Element& element, Values* values) {
         values->next(property.type);
 }
 
-Status checked(const ScanSurface& surface, const std::string& where) {
+Status check_surface(const ScanSurface& surface, const std::string& where) {
   if (surface.positions.empty())
     return error("{}: expected points, found none. The scan is empty: scan again.", where);
   for (std::size_t i = 0; i < surface.positions.size(); ++i)
@@ -307,7 +307,7 @@ Result<ScanSurface> load_ply(const std::filesystem::path& path, double metres_pe
           "{}: expected a complete {} list, found the end of a truncated file. Copy or export it again.",
           where, element.name);
   }
-  LIMN_TRY_STATUS(checked(surface, where));
+  LIMN_TRY_STATUS(check_surface(surface, where));
   if (surface.normals.empty()) surface.normals = normals_from_triangles(surface);
   return surface;
 }

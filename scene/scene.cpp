@@ -318,18 +318,18 @@ Result<std::map<std::string, LengthUnit>> load_units(const fs::path& file) {
   return units;
 }
 
-// Imports a mesh from a slot's folder; `told` has the units that people have given, by variant.
+// Imports a mesh from a slot's folder; `known_units` has the units that people have given, by variant.
 Result<Variant> auto_import_meshes(const fs::path& file,
                                    const Slot& slot,
-                                   const std::map<std::string, LengthUnit>& told) {
+                                   const std::map<std::string, LengthUnit>& known_units) {
   const std::string name = file.stem().string();
   if (find_named(slot.variants, name))
     return error(
         "{}: expected a file name that no other variant of slot '{}' has, found '{}' twice. Rename the file.",
         file.string(), slot.name, name);
   LIMN_TRY(const Mesh as_metres, load_mesh(file, LengthUnit::metre));
-  const auto known = told.find(name);
-  const bool is_guess = known == told.end();
+  const auto known = known_units.find(name);
+  const bool is_guess = known == known_units.end();
   const LengthUnit units = is_guess ? guessed_units(file, as_metres) : known->second;
   LIMN_TRY(Mesh mesh, load_mesh(file, units));
   if (const Status size = check_size(mesh, units); !size)
@@ -360,12 +360,12 @@ Status load_variants(std::span<const MeshFile> listed,
   }
   std::error_code none;
   std::set<fs::path> files;
-  LIMN_TRY(const auto told, load_units(scene_folder / "slots" / slot->name / "units.json"));
+  LIMN_TRY(const auto known_units, load_units(scene_folder / "slots" / slot->name / "units.json"));
   for (const auto& entry : fs::directory_iterator(scene_folder / "slots" / slot->name, none))
     for (const char* end : {".glb", ".gltf", ".obj", ".stl", ".ply"})
       if (entry.path().extension() == end) files.insert(entry.path());
   for (const fs::path& file : files) {
-    auto variant = auto_import_meshes(file, *slot, told);
+    auto variant = auto_import_meshes(file, *slot, known_units);
     if (variant)
       variants.push_back(std::move(*variant));
     else

@@ -28,7 +28,7 @@ AppendLog& AppendLog::operator=(AppendLog&& other) noexcept {
   waiting_ = std::exchange(other.waiting_, {});
   written_at_ = other.written_at_;
   is_stuck_ = other.is_stuck_;
-  is_told_ = other.is_told_;
+  is_reported_ = other.is_reported_;
   why_ = std::move(other.why_);
   return *this;
 }
@@ -55,11 +55,11 @@ void AppendLog::flush() {
   if (is_stuck_ == !written) return;
   is_stuck_ = !written;
   why_ = is_stuck_ ? written.message() : "";
-  is_told_ = false;
+  is_reported_ = false;
 }
 
-std::optional<std::string> AppendLog::news() {
-  if (std::exchange(is_told_, true)) return std::nullopt;
+std::optional<std::string> AppendLog::take_message() {
+  if (std::exchange(is_reported_, true)) return std::nullopt;
   if (!is_stuck_) return path_.filename().string() + " can be written again.";
   return why_ + " Its lines are kept and written later.";
 }

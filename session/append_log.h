@@ -27,13 +27,13 @@ class AppendLog {
   void flush();
 
   /// A message when writing begins to fail, and one when it works again, each once; otherwise nullopt.
-  std::optional<std::string> news();
+  std::optional<std::string> take_message();
 
  private:
   std::filesystem::path path_;
   std::string waiting_;
   std::optional<Stamp> written_at_;
-  bool is_stuck_ = false, is_told_ = true;
+  bool is_stuck_ = false, is_reported_ = true;
   std::string why_;
 };
 

@@ -12,7 +12,7 @@ std::size_t DeviceHealth::add(DeviceState device) {
 void DeviceHealth::works(std::size_t device) {
   const std::lock_guard lock(mutex_);
   DeviceState& state = devices_.at(device);
-  if (!state.works) news_.push_back(state.name + " is back");
+  if (!state.works) messages_.push_back(state.name + " is back");
   state.works = true;
   state.why.clear();
   ++state.images;
@@ -22,15 +22,15 @@ void DeviceHealth::fails(std::size_t device, const std::string& why) {
   const std::lock_guard lock(mutex_);
   DeviceState& state = devices_.at(device);
   if (state.works)
-    news_.push_back(state.name + " is gone; the session goes on without it" +
-                    (why.empty() ? "" : ": " + why));
+    messages_.push_back(state.name + " is gone; the session goes on without it" +
+                        (why.empty() ? "" : ": " + why));
   state.works = false;
   state.why = why;
 }
 
 void DeviceHealth::note(const std::string& what) {
   const std::lock_guard lock(mutex_);
-  news_.push_back(what);
+  messages_.push_back(what);
 }
 
 std::vector<DeviceState> DeviceHealth::all() const {
@@ -38,9 +38,9 @@ std::vector<DeviceState> DeviceHealth::all() const {
   return devices_;
 }
 
-std::vector<std::string> DeviceHealth::news() {
+std::vector<std::string> DeviceHealth::take_messages() {
   const std::lock_guard lock(mutex_);
-  return std::exchange(news_, {});
+  return std::exchange(messages_, {});
 }
 
 }  // namespace limn::session

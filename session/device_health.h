@@ -30,12 +30,12 @@ class DeviceHealth {
 
   std::vector<DeviceState> all() const;
   /// The messages since the last call: devices that failed or work again (each change once), and notes.
-  std::vector<std::string> news();
+  std::vector<std::string> take_messages();
 
  private:
   mutable std::mutex mutex_;
   std::vector<DeviceState> devices_;
-  std::vector<std::string> news_;
+  std::vector<std::string> messages_;
 };
 
 }  // namespace limn::session

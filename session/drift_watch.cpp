@@ -50,10 +50,10 @@ std::string sentence(const Drift& drift) {
       names, drift.px, drift.mm);
 }
 
-std::optional<std::string> DriftNotices::news(const std::optional<Drift>& drift) {
-  const bool is_news =
+std::optional<std::string> DriftNotices::new_notice(const std::optional<Drift>& drift) {
+  const bool is_new =
       drift.has_value() != reported_.has_value() || (drift && drift->devices != reported_->devices);
-  if (!is_news) return std::nullopt;
+  if (!is_new) return std::nullopt;
   reported_ = drift;
   return drift ? sentence(*drift) : "All devices are back in their calibrated position.";
 }

@@ -31,7 +31,7 @@ class DriftNotices {
  public:
   /// A message when another device has moved than was last reported, or when all are back in place; otherwise
   /// nullopt.
-  std::optional<std::string> news(const std::optional<Drift>& drift);
+  std::optional<std::string> new_notice(const std::optional<Drift>& drift);
   /// The drift that was last reported.
   const std::optional<Drift>& reported() const { return reported_; }
   /// To be called when the rig is replaced: nothing has been reported about the new one yet.

@@ -113,7 +113,7 @@ std::map<scene::Screen, cv::Mat> FrameLoop::screen_images() {
 }
 
 void FrameLoop::note_devices() {
-  for (const std::string& what : setting_.health.news()) {
+  for (const std::string& what : setting_.health.take_messages()) {
     parts_.output.telemetry().note(setting_.clock.now(), what);
     log_warning("live: {}", what);
   }

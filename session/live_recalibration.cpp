@@ -58,15 +58,15 @@ LiveRecalibration::LiveRecalibration(const Rig& rig,
                                      fs::path folder,
                                      const std::function<wizard::WizardBackend(ImageWriter*)>& backend)
     : folder_(std::move(folder)), images_(wizard::recheck_images(rig)) {
-  result_ =
-      std::async(std::launch::async,
-                 [this, rig, backend = through_errands(backend(&writer_))]() -> Result<wizard::Rechecked> {
-                   try {
-                     return wizard::rechecked_in_place(rig, backend, folder_, [this] { return !is_over_; });
-                   } catch (const std::exception& bug) {
-                     return error("this is a bug in Limn, please report it: {}", bug.what());
-                   }
-                 });
+  result_ = std::async(
+      std::launch::async,
+      [this, rig, backend = run_on_session_thread(backend(&writer_))]() -> Result<wizard::Rechecked> {
+        try {
+          return wizard::recheck_in_place(rig, backend, folder_, [this] { return !is_over_; });
+        } catch (const std::exception& bug) {
+          return error("this is a bug in Limn, please report it: {}", bug.what());
+        }
+      });
 }
 
 LiveRecalibration::~LiveRecalibration() {
@@ -75,7 +75,7 @@ LiveRecalibration::~LiveRecalibration() {
 }
 
 // The same functions, executed by serve(). After cancellation they return errors.
-wizard::WizardBackend LiveRecalibration::through_errands(wizard::WizardBackend backend) {
+wizard::WizardBackend LiveRecalibration::run_on_session_thread(wizard::WizardBackend backend) {
   wizard::WizardBackend out;
   out.capture.show = [this, show = backend.capture.show](int projector, const cv::Mat& image) {
     Status status = error("{}", k_ended);

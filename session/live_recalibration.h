@@ -27,7 +27,8 @@ Result<std::filesystem::path> recalibration_folder(const std::filesystem::path& 
 /// priority.
 class LiveRecalibration {
  public:
-  /// `backend` must set stage, written and use_latency; its images go to the writer that it is given.
+  /// `backend` must set capture, wait_for_files and use_latency; its images go to the writer that it is
+  /// given.
   LiveRecalibration(const Rig& rig,
                     std::filesystem::path folder,
                     const std::function<wizard::WizardBackend(ImageWriter*)>& backend);
@@ -48,7 +49,7 @@ class LiveRecalibration {
   const std::filesystem::path& folder() const { return folder_; }
 
  private:
-  wizard::WizardBackend through_errands(wizard::WizardBackend backend);
+  wizard::WizardBackend run_on_session_thread(wizard::WizardBackend backend);
 
   std::filesystem::path folder_;
   int images_ = 0;

@@ -194,7 +194,7 @@ Result<std::string> value_of(scene::ArgumentKind argument_kind, std::string_view
 
 }  // namespace
 
-std::vector<OscAddress> osc_heard() {
+std::vector<OscAddress> osc_received() {
   std::vector<OscAddress> all;
   for (const scene::Action& action : scene::actions())
     all.push_back({fmt::format("{}{}", k_root, action.name), arguments_of(action), std::string(action.what),
@@ -202,7 +202,7 @@ std::vector<OscAddress> osc_heard() {
   return all;
 }
 
-const std::vector<OscAddress>& osc_told() {
+const std::vector<OscAddress>& osc_sent() {
   static const std::vector<OscAddress> all = {
       {"/limn/state/variant", "slot (text); variant (text)", "which variant a slot shows"},
       {"/limn/state/pose", "slot (text); x, y, z in mm; quaternion w, x, y, z",

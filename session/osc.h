@@ -21,9 +21,9 @@ struct OscAddress {
 };
 
 /// The addresses that a session receives: one for each of scene::actions(), in their order.
-std::vector<OscAddress> osc_heard();
+std::vector<OscAddress> osc_received();
 /// The addresses that a session sends.
-const std::vector<OscAddress>& osc_told();
+const std::vector<OscAddress>& osc_sent();
 
 /// Longer datagrams are refused; bytes.
 constexpr std::size_t k_longest_osc = 1024;

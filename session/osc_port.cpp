@@ -10,7 +10,7 @@
 namespace limn::session {
 namespace {
 
-constexpr auto k_longest_hearing = std::chrono::milliseconds(5);
+constexpr auto k_longest_receiving = std::chrono::milliseconds(5);
 constexpr auto k_between_refusals = std::chrono::seconds(1);
 constexpr auto k_between_all = std::chrono::seconds(1);
 constexpr float k_same_mm = 0.05F, k_same_turn = 0.0003F;  // of a quaternion: 0.03 degrees
@@ -35,60 +35,60 @@ bool is_same(const std::vector<OscValue>& a, const std::vector<OscValue>& b) {
 
 }  // namespace
 
-Result<OscPort> OscPort::open(const std::string& hear, const std::string& tell) {
+Result<OscPort> OscPort::open(const std::string& receive_at, const std::string& send_to) {
   OscPort out;
   const auto named = [](const char* option, const Error& problem) {
     return Error{fmt::format("{}: {}", option, problem.message), problem.wrong_usage};
   };
-  if (!hear.empty()) {
-    const auto place = net_place(hear, "127.0.0.1", true);
+  if (!receive_at.empty()) {
+    const auto place = net_place(receive_at, "127.0.0.1", true);
     if (!place) return named("--osc", place.error());
-    auto socket = UdpSocket::hearing(*place);
+    auto socket = UdpSocket::receiving(*place);
     if (!socket) return named("--osc", socket.error());
-    out.ear_ = std::move(*socket);
+    out.input_ = std::move(*socket);
     log_info("live: receives OSC at {}, UDP port {}", place->host, out.port());
   }
-  if (!tell.empty()) {
-    const auto place = net_place(tell, "127.0.0.1");
+  if (!send_to.empty()) {
+    const auto place = net_place(send_to, "127.0.0.1");
     if (!place) return named("--osc-to", place.error());
     auto socket = UdpSocket::sending(*place);
     if (!socket) return named("--osc-to", socket.error());
-    out.mouth_ = std::move(*socket);
+    out.output_ = std::move(*socket);
   }
   return out;
 }
 
 void OscPort::apply_edits(Session* session, Telemetry* telemetry, Stamp at) {
-  if (!ear_) return;
+  if (!input_) return;
   std::array<std::uint8_t, k_longest_osc + 1> bytes;
   const Stamp begun = now();
-  for (int i = 0; i < k_most_at_once && now() - begun < k_longest_hearing; ++i) {
-    const auto length = ear_->next(bytes);
+  for (int i = 0; i < k_most_at_once && now() - begun < k_longest_receiving; ++i) {
+    const auto length = input_->next(bytes);
     if (!length) break;
     const auto edit = edit_of_osc({bytes.data(), std::min(*length, bytes.size())});
     const Status done = edit ? session->edit(*edit, "osc", at) : Status(edit.error());
     if (!done) refuse(done.message(), telemetry, at);
   }
-  if (untold_ > 0 && at - *refused_at_ >= k_between_refusals) refuse("further messages", telemetry, at);
+  if (unreported_ > 0 && at - *refused_at_ >= k_between_refusals) refuse("further messages", telemetry, at);
 }
 
 void OscPort::refuse(const std::string& why, Telemetry* telemetry, Stamp at) {
   if (refused_at_ && at - *refused_at_ < k_between_refusals) {
-    ++untold_;
+    ++unreported_;
     return;
   }
-  const std::string more = untold_ > 0 ? fmt::format(" ({} more refused meanwhile)", untold_) : "";
+  const std::string more = unreported_ > 0 ? fmt::format(" ({} more refused meanwhile)", unreported_) : "";
   telemetry->note(at, fmt::format("OSC refused: {}{}", why, more));
   log_warning("live: OSC: {}{}", why, more);
   refused_at_ = at;
-  untold_ = 0;
+  unreported_ = 0;
 }
 
 void OscPort::publish_state(const Session& session, Stamp at) {
-  if (!mouth_) return;
-  if (!told_all_at_ || at - *told_all_at_ >= k_between_all) {
-    told_all_at_ = at;
-    told_.clear();
+  if (!output_) return;
+  if (!sent_all_at_ || at - *sent_all_at_ >= k_between_all) {
+    sent_all_at_ = at;
+    sent_.clear();
   }
   const scene::ShowState& show_state = session.show_state();
   const scene::PosedScene& posed = session.composed().posed;
@@ -126,10 +126,10 @@ void OscPort::publish_state(const Session& session, Stamp at) {
 }
 
 void OscPort::put(const std::string& key, const std::string& path, std::vector<OscValue> arguments) {
-  const auto known = told_.find(key);
-  if (known != told_.end() && is_same(known->second, arguments)) return;
-  mouth_->send(osc_message(path, arguments));
-  told_[key] = std::move(arguments);
+  const auto known = sent_.find(key);
+  if (known != sent_.end() && is_same(known->second, arguments)) return;
+  output_->send(osc_message(path, arguments));
+  sent_[key] = std::move(arguments);
 }
 
 }  // namespace limn::session

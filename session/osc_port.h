@@ -19,9 +19,9 @@ namespace limn::session {
 /// buffer for the socket, which does not grow: when it is full, datagrams are lost.
 class OscPort : public SessionClient {
  public:
-  /// `hear`: PORT on the loopback interface, or ADDRESS:PORT; port 0: any free one. `tell`: HOST:PORT. An
-  /// empty text: receives or sends nothing. Errors name the option.
-  static Result<OscPort> open(const std::string& hear, const std::string& tell);
+  /// `receive_at`: PORT on the loopback interface, or ADDRESS:PORT; port 0: any free one. `send_to`:
+  /// HOST:PORT. An empty text: receives or sends nothing. Errors name the option.
+  static Result<OscPort> open(const std::string& receive_at, const std::string& send_to);
 
   /// Applies the edits of the messages that wait, at most k_most_at_once of them and for at most 5 ms; the
   /// others wait for the next call. Refused messages are reported at most once a second, with the number of
@@ -37,7 +37,7 @@ class OscPort : public SessionClient {
   void publish_state(const SessionMoment& moment) override { publish_state(moment.session, moment.at); }
 
   /// The port on which it receives; 0: none.
-  int port() const { return ear_ ? ear_->port() : 0; }
+  int port() const { return input_ ? input_->port() : 0; }
 
   static constexpr int k_most_at_once = 64;
 
@@ -45,11 +45,11 @@ class OscPort : public SessionClient {
   void refuse(const std::string& why, Telemetry* telemetry, Stamp at);
   void put(const std::string& key, const std::string& path, std::vector<OscValue> arguments);
 
-  std::optional<UdpSocket> ear_, mouth_;
+  std::optional<UdpSocket> input_, output_;
   std::optional<Stamp> refused_at_;
-  std::size_t untold_ = 0;  // refusals that were not reported yet
-  std::map<std::string, std::vector<OscValue>> told_;
-  std::optional<Stamp> told_all_at_;
+  std::size_t unreported_ = 0;  // refusals that were not reported yet
+  std::map<std::string, std::vector<OscValue>> sent_;
+  std::optional<Stamp> sent_all_at_;
 };
 
 }  // namespace limn::session

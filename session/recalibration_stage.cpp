@@ -8,7 +8,7 @@ namespace limn::session {
 namespace {
 
 // Wait for a device call of a recalibration.
-constexpr auto k_errand_wait = std::chrono::milliseconds(10);
+constexpr auto k_task_wait = std::chrono::milliseconds(10);
 
 }  // namespace
 
@@ -24,7 +24,7 @@ void RecalibrationStage::step(const FrameClock& clock) {
     if (std::exchange(session_->recalibration().is_requested, false)) begin(clock);
     return;
   }
-  if (holds_light()) recalibration_->serve(k_errand_wait);
+  if (holds_light()) recalibration_->serve(k_task_wait);
   session_->recalibration().progress = recalibration_->words();
   if (const auto checked = recalibration_->take_result()) {
     pause();

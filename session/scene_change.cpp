@@ -48,8 +48,8 @@ Status check_same_markers(const scene::Scene& now, const scene::Scene& next) {
       (next.folder / "scene.json").string());
 }
 
-Status check_all_loaded(const scene::Scene& now, const SceneNews& news) {
-  for (const scene::SkippedVariant& skipped : news.skipped_variants) {
+Status check_all_loaded(const scene::Scene& now, const LoadedScene& loaded) {
+  for (const scene::SkippedVariant& skipped : loaded.skipped_variants) {
     const scene::Slot* slot = now.find_slot(skipped.slot);
     if (!slot) continue;
     for (const std::string& name : variant_names(*slot))

@@ -15,7 +15,7 @@ namespace limn::session {
 Status check_same_markers(const scene::Scene& now, const scene::Scene& next);
 
 /// Error: a variant that `now` has can no longer be loaded. A variant that never could be loaded is no error.
-Status check_all_loaded(const scene::Scene& now, const SceneNews& news);
+Status check_all_loaded(const scene::Scene& now, const LoadedScene& loaded);
 
 /// The show state for the scene `next`: a new variant of a slot is shown at once, and a variant that is gone
 /// is replaced by the slot's first.

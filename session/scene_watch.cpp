@@ -33,7 +33,7 @@ SceneWatch::Files SceneWatch::listed() const {
   return files;
 }
 
-std::optional<Result<SceneNews>> SceneWatch::news() {
+std::optional<Result<LoadedScene>> SceneWatch::take_changed_scene() {
   if (loading_.valid()) {
     if (loading_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
     return loading_.get();
@@ -48,10 +48,10 @@ std::optional<Result<SceneNews>> SceneWatch::news() {
   }
   if (seen_ == loaded_ || now - changed_at_ < k_left_alone) return std::nullopt;
   loaded_ = seen_;
-  loading_ = std::async(std::launch::async, [folder = folder_]() -> Result<SceneNews> {
-    SceneNews news;
-    LIMN_TRY(news.scene, scene::load_scene(folder, &news.skipped_variants));
-    return news;
+  loading_ = std::async(std::launch::async, [folder = folder_]() -> Result<LoadedScene> {
+    LoadedScene loaded;
+    LIMN_TRY(loaded.scene, scene::load_scene(folder, &loaded.skipped_variants));
+    return loaded;
   });
   return std::nullopt;
 }

@@ -15,7 +15,7 @@
 namespace limn::session {
 
 /// A scene as its files are now, and the variants that cannot be loaded.
-struct SceneNews {
+struct LoadedScene {
   scene::Scene scene;
   std::vector<scene::SkippedVariant> skipped_variants;
 };
@@ -28,7 +28,7 @@ class SceneWatch {
 
   /// The scene after its files have changed, or an error if it cannot be loaded; once for each change. Checks
   /// the folder ten times a second at most, and never waits.
-  std::optional<Result<SceneNews>> news();
+  std::optional<Result<LoadedScene>> take_changed_scene();
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -38,7 +38,7 @@ class SceneWatch {
   std::filesystem::path folder_;
   Files loaded_, seen_;
   Clock::time_point looked_at_, changed_at_;
-  std::future<Result<SceneNews>> loading_;
+  std::future<Result<LoadedScene>> loading_;
 };
 
 }  // namespace limn::session

@@ -146,11 +146,11 @@ Status Session::replace_rig(Rig rig, Stamp at) {
 }
 
 void Session::reload_changed_scene(SceneWatch* files, Stamp at) {
-  auto news = files->news();
-  if (!news) return;
-  Status done = *news ? check_all_loaded(setup_.scene, **news) : Status(news->error());
-  if (done) done = replace_scene(std::move((*news)->scene), at);
-  if (done) return report_skipped((*news)->skipped_variants, at, telemetry_);
+  auto changed = files->take_changed_scene();
+  if (!changed) return;
+  Status done = *changed ? check_all_loaded(setup_.scene, **changed) : Status(changed->error());
+  if (done) done = replace_scene(std::move((*changed)->scene), at);
+  if (done) return report_skipped((*changed)->skipped_variants, at, telemetry_);
   warn(at, done.message() + " The parts stay as they were.");
 }
 
@@ -162,7 +162,7 @@ FrameInput Session::predict(const FrameTimes& times) {
 
 const ComposedFrame& Session::compose(const FrameInput& input) {
   const auto begun = std::chrono::steady_clock::now();
-  if (const auto news = composer_.compose(input, setup_)) warn(input.times.now, *news);
+  if (const auto message = composer_.compose(input, setup_)) warn(input.times.now, *message);
   paint_ms_ = milliseconds_since(begun);
   return composed();
 }
@@ -183,7 +183,7 @@ void Session::check_drift(Stamp now) {
   FrameComposer* composer = composer_.composer();
   if (!composer) return;
   composer->check_drift(percepts_);
-  if (const auto news = drift_.news(composer->drift())) warn(now, *news);
+  if (const auto message = drift_.new_notice(composer->drift())) warn(now, *message);
 }
 
 void Session::report_unwritten(Stamp at) {

@@ -34,7 +34,7 @@ class SessionClient {
 
   /// Overlays for the projected light only: recorded and reported images are without them.
   virtual std::vector<Overlay> overlays(Session*) { return {}; }
-  /// Whether the next tell() needs an image of the screen.
+  /// Whether the next publish_state() needs an image of the screen.
   virtual bool wants_screen() const { return false; }
   /// Whether this client has ended the session.
   virtual bool ends_session() const { return false; }

@@ -45,11 +45,11 @@ Result<SessionOutput> SessionOutput::open(const std::filesystem::path& out,
 void SessionOutput::add_frame(const ShownFrame& frame, const ComposedFrame& composed) {
   telemetry_.add(frame);
   if (poses_.is_open()) add_poses(composed);
-  if (const auto news = poses_.news()) telemetry_.note(composed.shown_at, *news);
-  if (!recorder_ || told_of_recording_) return;
+  if (const auto message = poses_.take_message()) telemetry_.note(composed.shown_at, *message);
+  if (!recorder_ || recording_error_reported_) return;
   const auto ended = recorder_->ended();
   if (!ended) return;
-  told_of_recording_ = true;
+  recording_error_reported_ = true;
   telemetry_.note(composed.shown_at, "the recording ended: " + *ended);
   log_warning("live: the recording ended at {:.2f} s: {}. The session goes on.",
               seconds_of(composed.shown_at), *ended);

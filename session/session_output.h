@@ -41,7 +41,7 @@ class SessionOutput {
   Telemetry telemetry_;
   AppendLog poses_;
   std::unique_ptr<Recorder> recorder_;
-  bool told_of_recording_ = false;
+  bool recording_error_reported_ = false;
 };
 
 }  // namespace limn::session

@@ -62,13 +62,13 @@ std::optional<std::string> SwappedCamerasCheck::check(
     std::span<const Body> bodies,
     std::span<const std::vector<tracker::Detection>> detections,
     Stamp captured_at) {
-  if (has_told_ || rig.cameras.size() < 2 ||
+  if (has_warned_ || rig.cameras.size() < 2 ||
       seconds_between(compared_at_, captured_at) < k_compare_cameras_every_s)
     return std::nullopt;
   compared_at_ = captured_at;
   const auto swapped = swapped_cameras(rig, bodies, detections, captured_at);
   if (!swapped) return std::nullopt;
-  has_told_ = true;
+  has_warned_ = true;
   return fmt::format(
       "{} and {} seem to be exchanged: each sees what the other should see. Exchange their cables, "
       "or their addresses in the devices file.",
@@ -76,7 +76,7 @@ std::optional<std::string> SwappedCamerasCheck::check(
 }
 
 void SwappedCamerasCheck::begin_anew(Stamp at) {
-  has_told_ = false;
+  has_warned_ = false;
   compared_at_ = at;
 }
 

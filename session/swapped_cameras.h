@@ -36,7 +36,7 @@ class SwappedCamerasCheck {
 
  private:
   Stamp compared_at_;
-  bool has_told_ = false;
+  bool has_warned_ = false;
 };
 
 }  // namespace limn::session

@@ -104,7 +104,7 @@ void Telemetry::add(const ShownFrame& frame) {
                        latency_ms, frame.detect_ms, frame.filter_ms, frame.paint_ms, frame.screen_ms,
                        frame.record_ms, frame.markers, frame.lost, frame.missed, frame.placement_mm),
            frame.shown_at);
-  if (const auto news = csv_.news()) note(frame.shown_at, *news);
+  if (const auto message = csv_.take_message()) note(frame.shown_at, *message);
 }
 
 // When there are too many slices, every two neighbours are merged.

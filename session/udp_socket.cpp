@@ -59,7 +59,7 @@ Result<NetPlace> net_place(const std::string& text, const std::string& default_h
   return place;
 }
 
-Result<UdpSocket> UdpSocket::hearing(const NetPlace& place) {
+Result<UdpSocket> UdpSocket::receiving(const NetPlace& place) {
   LIMN_TRY(const Addresses addresses, addresses_of(place, AI_NUMERICHOST | AI_PASSIVE));
   UdpSocket out(open_for(*addresses));
   if (out.handle_ < 0 || bind(out.handle_, addresses->ai_addr, addresses->ai_addrlen) != 0)

@@ -24,7 +24,7 @@ class UdpSocket {
  public:
   /// Opens a socket that receives at a numeric address of this machine. Error: this machine has no such
   /// address, or the port is in use.
-  static Result<UdpSocket> hearing(const NetPlace& place);
+  static Result<UdpSocket> receiving(const NetPlace& place);
   /// Opens a socket that sends to a host. Error: the host has no address.
   static Result<UdpSocket> sending(const NetPlace& place);
   UdpSocket(UdpSocket&& other) noexcept;

@@ -34,11 +34,11 @@ const SelectedViewpoint& ViewpointSelector::select(const scene::PosedScene& pose
 // are no viewers. Null: viewers move, or share a viewpoint.
 const Imager* ViewpointSelector::still_viewer() const {
   if (scene_->viewers.size() == 1 && scene_->viewers[0].fixed) return &*scene_->viewers[0].fixed;
-  return scene_->viewers.empty() ? &stand_in() : nullptr;
+  return scene_->viewers.empty() ? &substitute_viewer() : nullptr;
 }
 
 // The viewpoint that is used until a viewer is seen.
-const Imager& ViewpointSelector::stand_in() const {
+const Imager& ViewpointSelector::substitute_viewer() const {
   return rig_->cameras.empty() ? rig_->projectors[0] : rig_->cameras[0];
 }
 
@@ -59,7 +59,7 @@ std::vector<scene::Viewpoint> ViewpointSelector::guests_eyes(const FrameInput& i
 }
 
 // A guest's position is known about ten times a second and is noisy, so it is smoothed over time.
-void ViewpointSelector::glide(std::vector<scene::Viewpoint>* guests, double seconds) {
+void ViewpointSelector::move_smoothly(std::vector<scene::Viewpoint>* guests, double seconds) {
   const double step = 1 - std::exp(-seconds / k_glide_s);
   for (scene::Viewpoint& eye : *guests)
     for (const scene::Viewpoint& before : gliding_)
@@ -77,11 +77,11 @@ Imager ViewpointSelector::viewer_for(const scene::PosedScene& posed,
   if (still && !is_away_) return *still;
   const double seconds = eye_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(eye_at_, at));
   eye_at_ = std::max(eye_at_, at);
-  glide(&guests, seconds);
+  move_smoothly(&guests, seconds);
   const auto p_middle = scene::middle_of(*scene_, posed);
-  if (!p_middle) return selected_.viewer.width > 0 ? selected_.viewer : still ? *still : stand_in();
-  const scene::Viewpoint waiting{k_still_eye,
-                                 (still ? *still : stand_in()).imager_from_world.inverse().translation};
+  if (!p_middle) return selected_.viewer.width > 0 ? selected_.viewer : still ? *still : substitute_viewer();
+  const scene::Viewpoint waiting{
+      k_still_eye, (still ? *still : substitute_viewer()).imager_from_world.inverse().translation};
   std::vector<scene::Viewpoint> eyes = posed.viewpoints;
   if (still) eyes = {waiting};
   if (!selected_.follows.empty()) eyes.clear();
@@ -101,9 +101,9 @@ Imager ViewpointSelector::viewer_for(const scene::PosedScene& posed,
   }
   const Eigen::Vector3d p_eye = *shared_eye_.p_world();
   if (is_away_) selected_.p_guest_eye_world = p_eye;
-  if (shared_eye_.leader == k_still_eye && !still) return stand_in();
+  if (shared_eye_.leader == k_still_eye && !still) return substitute_viewer();
   const auto viewer = scene::viewer_at(p_eye, *scene_, posed, d_up_world_);
-  return viewer ? *viewer : still ? *still : stand_in();
+  return viewer ? *viewer : still ? *still : substitute_viewer();
 }
 
 }  // namespace limn::session

@@ -39,10 +39,10 @@ class ViewpointSelector {
 
  private:
   const Imager* still_viewer() const;
-  const Imager& stand_in() const;
+  const Imager& substitute_viewer() const;
   std::vector<scene::Viewpoint> guests_eyes(const FrameInput& input) const;
   Imager viewer_for(const scene::PosedScene& posed, std::vector<scene::Viewpoint> guests, Stamp at);
-  void glide(std::vector<scene::Viewpoint>* guests, double seconds);
+  void move_smoothly(std::vector<scene::Viewpoint>* guests, double seconds);
 
   const scene::Scene* scene_;
   const Rig* rig_;

@@ -126,7 +126,7 @@ ChosenCorners corners_at(const BodyCorrespondences& correspondences, const Pose&
 }
 
 std::vector<PoseFit> minima(const BodyCorrespondences& correspondences,
-                            std::span<const Pose> foretold,
+                            std::span<const Pose> predicted,
                             Minima wanted) {
   std::vector<PoseFit> found;
   if (correspondences.empty()) return found;
@@ -137,7 +137,7 @@ std::vector<PoseFit> minima(const BodyCorrespondences& correspondences,
         !is_near(found, fit->world_from_body, k_same_minimum))
       found.push_back(*fit);
   };
-  for (const Pose& pose : foretold.first(std::min<std::size_t>(2, foretold.size())))
+  for (const Pose& pose : predicted.first(std::min<std::size_t>(2, predicted.size())))
     refine(pose, k_explained_cost);
   const std::size_t proposers = found.empty() ? k_max_proposers : 1;
   // A lone marker's proposals are its two minima already.

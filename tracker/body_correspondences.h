@@ -41,14 +41,14 @@ struct ChosenCorners {
 };
 ChosenCorners corners_at(const BodyCorrespondences& correspondences, const Pose& world_from_body);
 
-enum class Minima { all, foretold };
+enum class Minima { all, predicted };
 
 /// The local minima of the body's robust reprojection error, at most two, likeliest first. The second is the
 /// other branch of the planar ambiguity, where there is one. Every marker proposes both of its branches as
-/// starts. If one of the `foretold` poses leads to a minimum that explains the corners, only the largest
-/// marker proposes starts; with Minima::foretold no marker does.
+/// starts. If one of the `predicted` poses leads to a minimum that explains the corners, only the largest
+/// marker proposes starts; with Minima::predicted no marker does.
 std::vector<PoseFit> minima(const BodyCorrespondences& correspondences,
-                            std::span<const Pose> foretold = {},
+                            std::span<const Pose> predicted = {},
                             Minima wanted = Minima::all);
 
 /// Whether a detection is this marker. File names are compared without their folders.

@@ -230,13 +230,13 @@ BodyFilter seen_again(const BodyFilter& known,
   after.looked_at = captured_at;
   const double unseen = seconds_between(known.measured_at, captured_at);
   const bool was_lost = unseen > lost_after_s(known, model);
-  std::vector<Pose> foretold;
+  std::vector<Pose> predictions;
   if (!was_lost)
     for (const Branch& branch : known.branches)
-      foretold.push_back(pose_after(branch.moving, std::min(unseen, model.extrapolation_limit_s)));
+      predictions.push_back(pose_after(branch.moving, std::min(unseen, model.extrapolation_limit_s)));
   after.of_one = known.branches.size() == 1 ? known.of_one + 1 : 0;
   const std::vector<PoseFit> fits =
-      minima(seen, foretold, after.of_one % k_second_every == 0 ? Minima::all : Minima::foretold);
+      minima(seen, predictions, after.of_one % k_second_every == 0 ? Minima::all : Minima::predicted);
   if (fits.empty()) return after;
   if (was_lost) return started(body, seen, fits, captured_at);
   if (auto branches = advanced(known, seen, fits, unseen, model)) {

@@ -51,7 +51,7 @@ State moved(const State& state, const Problem& problem, const Eigen::VectorXd& d
   return out;
 }
 
-PointObservation sight_at(const Observation& observation, const State& state) {
+PointObservation observation_at(const Observation& observation, const State& state) {
   PointObservation corner_observation = observation.corner_observation;
   corner_observation.p_body = state.body_from_marker[observation.marker] * observation.p_marker;
   return corner_observation;
@@ -60,7 +60,7 @@ PointObservation sight_at(const Observation& observation, const State& state) {
 double cost_of(const Problem& problem, const State& state) {
   double sum = 0;
   for (const Observation& observation : problem.observations) {
-    const PointObservation corner_observation = sight_at(observation, state);
+    const PointObservation corner_observation = observation_at(observation, state);
     sum += cost(std::span(&corner_observation, 1), state.world_from_body[observation.image], k_huber);
   }
   return sum;
@@ -74,7 +74,7 @@ struct Normal {
 // False when a corner has no pixel.
 bool add(const Problem& problem, const State& state, const Observation& observation, Normal* normal) {
   const Pose& world_from_body = state.world_from_body[observation.image];
-  const PointObservation corner_observation = sight_at(observation, state);
+  const PointObservation corner_observation = observation_at(observation, state);
   Eigen::Vector2d r;
   Eigen::Matrix<double, 2, 12> j;
   Eigen::Matrix<double, 2, 6> by_body;
@@ -169,7 +169,7 @@ double rms_px(const Problem& problem, const State& state) {
   double squares = 0;
   for (const Observation& observation : problem.observations) {
     Eigen::Vector2d r;
-    if (!residual(sight_at(observation, state), state.world_from_body[observation.image], &r))
+    if (!residual(observation_at(observation, state), state.world_from_body[observation.image], &r))
       return std::numeric_limits<double>::infinity();
     squares += r.squaredNorm();
   }

@@ -53,7 +53,7 @@ bool is_clockwise(const std::array<Eigen::Vector2d, 4>& c) {
   return true;
 }
 
-std::optional<std::array<PointObservation, 4>> corner_sights(
+std::optional<std::array<PointObservation, 4>> corner_observations(
     const Lens& lens,
     const std::array<Eigen::Vector3d, 4>& corners,
     const std::array<Eigen::Vector2d, 4>& corners_px,
@@ -137,7 +137,7 @@ std::vector<MarkerPose> marker_poses(const Lens& lens,
   const Eigen::Matrix3d homography = homography_from_square(*points);
   if (homography.isZero(0)) return {};
   const auto corners = square_corners(size_m);
-  const auto observations = corner_sights(lens, corners, corners_px, corner_covariance);
+  const auto observations = corner_observations(lens, corners, corners_px, corner_covariance);
   if (!observations) return {};
   std::vector<MarkerPose> poses;
   std::vector<double> chi_squares;

@@ -38,7 +38,7 @@ const std::vector<Measures>& all_measures() {
 
 }  // namespace
 
-Result<CheckResult> judged(const Check& check) {
+Result<CheckResult> judge_check(const Check& check) {
   if (check.truth.rig.projectors.empty())
     return error("{}: expected a world with a projector, found none.", check.name);
   const auto begun = std::chrono::steady_clock::now();

@@ -5,7 +5,7 @@
 
 namespace limn::validate {
 
-double CheckReading::strain() const {
+double CheckReading::limit_share() const {
   const double used = limit.measure.least ? 1 - value : value,
                allowed = limit.measure.least ? 1 - limit.value : limit.value;
   if (good()) return allowed > 0 ? std::min(1.0, used / allowed) : 0;

@@ -15,7 +15,7 @@ struct CheckReading {
   bool good() const { return limit.measure.least ? value >= limit.value : value <= limit.value; }
   /// The share of the limit that is used; above 1 the limit is missed. It orders readings of different
   /// measures.
-  double strain() const;
+  double limit_share() const;
 };
 
 /// What was drawn, what was expected, and the difference, for people (8-bit BGR).

@@ -105,9 +105,9 @@ Result<cv::Mat> photograph(sim::VirtualRig* room) {
 }
 
 // Photographs the room without projected light and finds everything in the image.
-Result<Moment> tracked_moment(Session* session,
-                              sim::VirtualRig* room,
-                              const std::vector<std::string>& variants) {
+Result<Moment> track_moment(Session* session,
+                            sim::VirtualRig* room,
+                            const std::vector<std::string>& variants) {
   room->darken();
   Moment moment;
   LIMN_TRY(const Frame frame, room->camera(0).next());
@@ -174,7 +174,7 @@ struct JudgedDots {
 };
 
 // Compares the light of the calibrated rig with the ground truth, with the door where the tracker says it is.
-Result<JudgedDots> judged(const Session& session, const sim::World& world, const Moment& moment) {
+Result<JudgedDots> judge(const Session& session, const sim::World& world, const Moment& moment) {
   const TargetDots dots = target_dots(world, k_judged_points, k_judged_seed);
   LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
   const Pose& world_from_prototype = *moment.posed.world_from_prototype;
@@ -236,15 +236,15 @@ struct Place {
   JudgedDots judged;
 };
 
-Result<Place> judged_place(const std::string& name,
-                           const Pose& world_from_prototype,
-                           Session* session,
-                           sim::VirtualRig* room,
-                           PhaseTimes* phases) {
+Result<Place> judge_place(const std::string& name,
+                          const Pose& world_from_prototype,
+                          Session* session,
+                          sim::VirtualRig* room,
+                          PhaseTimes* phases) {
   room->move("prototype", world_from_prototype);
-  LIMN_TRY(Moment moment, phases->time("track", [&] { return tracked_moment(session, room, {}); }));
+  LIMN_TRY(Moment moment, phases->time("track", [&] { return track_moment(session, room, {}); }));
   LIMN_TRY(JudgedDots judged_dots,
-           phases->time("judge", [&] { return judged(*session, room->world(), moment); }));
+           phases->time("judge", [&] { return judge(*session, room->world(), moment); }));
   return Place{name, std::move(moment), std::move(judged_dots)};
 }
 
@@ -259,10 +259,10 @@ std::vector<std::pair<std::string, Pose>> places_of(const Pose& world_from_proto
 }
 
 // Captures and calibrates, and sets up the session with the calibrated rig.
-Result<Session> calibrated(const fs::path& out,
-                           sim::VirtualRig* room,
-                           PhaseTimes* phases,
-                           bool keep_captures) {
+Result<Session> calibrate(const fs::path& out,
+                          sim::VirtualRig* room,
+                          PhaseTimes* phases,
+                          bool keep_captures) {
   const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
   std::error_code ignored;
   fs::remove_all(captures, ignored);
@@ -272,7 +272,8 @@ Result<Session> calibrated(const fs::path& out,
   wizard::SolveCommandOptions solving;
   solving.captures = captures;
   solving.out = rig_folder;
-  LIMN_TRY(const calib::Report report, phases->time("solve", [&] { return wizard::solved(solving); }));
+  LIMN_TRY(const calib::Report report,
+           phases->time("solve", [&] { return wizard::solve_captures(solving); }));
   if (!keep_captures) fs::remove_all(captures, ignored);
   const Rig& rig = report.solution.rig;
   scene::Scene scene = room->world().scene.value();
@@ -360,7 +361,7 @@ Result<std::vector<DemoImage>> session_images(Session* session, sim::VirtualRig*
   projector::Renderer& renderer = session->renderer;
 
   const std::string other_variant = session->scene.slots.at(0).variants.at(1).name;
-  LIMN_TRY(const Moment swapped, tracked_moment(session, room, {other_variant}));
+  LIMN_TRY(const Moment swapped, track_moment(session, room, {other_variant}));
   LIMN_TRY_STATUS(renderer.set_contact_shadow(&session->scene));
   room->camera_effects(0).srgb = true;  // sRGB for people; measurements use linear images
   LIMN_TRY(const cv::Mat unlit, shone(room, {}));
@@ -422,12 +423,12 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
            sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image));
   sim::VirtualRig room(std::move(world));
   PhaseTimes phases;
-  LIMN_TRY(Session session, calibrated(out, &room, &phases, keep_captures));
+  LIMN_TRY(Session session, calibrate(out, &room, &phases, keep_captures));
   Measurement measured;
   measured.held_out_px = session.held_out_px;
   const Pose in_place = room.world().world_from_prototype;
   for (const auto& [name, world_from_prototype] : places_of(in_place)) {
-    LIMN_TRY(Place place, judged_place(name, world_from_prototype, &session, &room, &phases));
+    LIMN_TRY(Place place, judge_place(name, world_from_prototype, &session, &room, &phases));
     measured.places.push_back(std::move(place));
   }
   room.move("prototype", in_place);

@@ -280,12 +280,12 @@ class Session {
 
 }  // namespace
 
-Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
-                                               const scene::Scene& scene,
-                                               const scene::PosedScene& posed,
-                                               const Imager& viewer,
-                                               const Hand& hand,
-                                               std::uint64_t seed) {
+Result<ShadowFillReading> measure_shadow_fill(const sim::World& world,
+                                              const scene::Scene& scene,
+                                              const scene::PosedScene& posed,
+                                              const Imager& viewer,
+                                              const Hand& hand,
+                                              std::uint64_t seed) {
   return Session(world, posed, viewer, hand, seed).run(scene);
 }
 

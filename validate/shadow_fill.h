@@ -46,11 +46,11 @@ struct ShadowFillReading {
 /// without a hand; the hand suddenly there; staying; moving; suddenly gone. Only the projectors' light on the
 /// prototype in the viewer's image counts. Error when the hand shades nothing that other projectors could
 /// light.
-Result<ShadowFillReading> measured_shadow_fill(const sim::World& world,
-                                               const scene::Scene& scene,
-                                               const scene::PosedScene& posed,
-                                               const Imager& viewer,
-                                               const Hand& hand,
-                                               std::uint64_t seed);
+Result<ShadowFillReading> measure_shadow_fill(const sim::World& world,
+                                              const scene::Scene& scene,
+                                              const scene::PosedScene& posed,
+                                              const Imager& viewer,
+                                              const Hand& hand,
+                                              std::uint64_t seed);
 
 }  // namespace limn::validate

@@ -16,8 +16,8 @@ Status judge_refill(CheckRun& run) {
       run.check().renderer_input.posed.parts.empty()
           ? run.scene_with_mesh(run.coat(), scene::Mode::surface)
           : std::pair(run.check().renderer_input.scene, run.check().renderer_input.posed);
-  const auto reading = measured_shadow_fill(run.check().truth, scene, posed, run.check().viewer,
-                                            run.check().hand, run.check().truth.seed);
+  const auto reading = measure_shadow_fill(run.check().truth, scene, posed, run.check().viewer,
+                                           run.check().hand, run.check().truth.seed);
   if (!reading) return error("{}: {}", run.check().name, reading.message());
   run.set("refill_share", reading->share);
   run.set("refill_flash_share", reading->flash);

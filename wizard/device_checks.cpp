@@ -14,7 +14,7 @@ class Checks {
 
   Status look_at_light() {
     step(WizardStep::outputs, WizardState::runs, "");
-    LIMN_TRY(out.light, measured_exposure(captures_, backend_.capture));
+    LIMN_TRY(out.light, measure_exposure(captures_, backend_.capture));
     if (listener_.on_light) listener_.on_light(out.light);
     report_progress(
         WizardStep::outputs, unseen(out.light),
@@ -43,7 +43,7 @@ class Checks {
       out.latency.emplace_back();
       const auto camera = best_camera(captures_.projectors[i].name);
       if (!camera) continue;
-      const auto measured = measured_latency(backend_.flashes(static_cast<int>(i), *camera));
+      const auto measured = wizard::measure_latency(backend_.flashes(static_cast<int>(i), *camera));
       if (!measured) {
         problems.push_back(fmt::format("{}: {}", captures_.projectors[i].name, measured.message()));
         continue;
@@ -90,9 +90,9 @@ class Checks {
 
 }  // namespace
 
-Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
-                                       const WizardBackend& backend,
-                                       const WizardListener& listener) {
+Result<CheckedDevices> check_devices(const calib::CaptureSet& captures,
+                                     const WizardBackend& backend,
+                                     const WizardListener& listener) {
   Checks checks(captures, backend, listener);
   LIMN_TRY_STATUS(checks.look_at_light());
   LIMN_TRY_STATUS(checks.measure_latency());

@@ -22,8 +22,8 @@ struct CheckedDevices {
 /// Lets every projector show its number, checks exposure and focus, measures the display latencies and passes
 /// them to `backend`. `listener` gets one line for each step. Problems are reported with advice; only a
 /// device that fails is an error.
-Result<CheckedDevices> checked_devices(const calib::CaptureSet& captures,
-                                       const WizardBackend& backend,
-                                       const WizardListener& listener);
+Result<CheckedDevices> check_devices(const calib::CaptureSet& captures,
+                                     const WizardBackend& backend,
+                                     const WizardListener& listener);
 
 }  // namespace limn::wizard

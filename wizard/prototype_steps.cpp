@@ -18,8 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t k_told = 3;  // number of warnings that are printed; all are in align.json
-constexpr double k_white = 0.9;    // share of a colour's white part that is not projected
+constexpr std::size_t k_most_printed = 3;  // number of warnings that are printed; all are in align.json
+constexpr double k_white = 0.9;            // share of a colour's white part that is not projected
 
 // The error's colour without most of its white, because room light and the projectors' black level add white.
 cv::Vec3d light_bgr(double mm) {
@@ -76,7 +76,7 @@ class Steps {
     LIMN_TRY_STATUS(captured);
     step(WizardStep::scan, WizardState::runs, "measuring");
     LIMN_TRY(captures_, calib::load_captures(captures.folder));
-    LIMN_TRY(scan_, written_scan(captures_, rig_, {}, out_));
+    LIMN_TRY(scan_, make_scan(captures_, rig_, {}, out_));
     seen_.points = scan_.points.positions.size();
     seen_.scan_stddev_mm = 1e3 * static_cast<double>(median(scan_.points.stddevs));
     seen_.warnings = scan_.warnings;
@@ -100,10 +100,10 @@ class Steps {
       command.frames.push_back(
           captures_.cameras[i].name + "=" +
           calib::image_path(captures_, 0, 0, static_cast<int>(i), captures_.patterns[0].white()).string());
-    auto aligned = written_alignment(command);
+    auto aligned = align_scan(command);
     if (!aligned) {  // perhaps no marker is visible: search without a start
       command.frames.clear();
-      aligned = written_alignment(command);
+      aligned = align_scan(command);
     }
     if (!aligned) {
       seen_.warnings.push_back(aligned.message());
@@ -113,11 +113,11 @@ class Steps {
     world_from_prototype_ = aligned->registration.world_from_prototype;
     seen_.align_rms_mm = 1e3 * aligned->registration.rms_m;
     seen_.warnings.insert(seen_.warnings.end(), aligned->warnings.begin(), aligned->warnings.end());
-    for (std::size_t i = 0; i < std::min(k_told, aligned->warnings.size()); ++i)
+    for (std::size_t i = 0; i < std::min(k_most_printed, aligned->warnings.size()); ++i)
       listener_.say("advice: " + aligned->warnings[i]);
-    if (aligned->warnings.size() > k_told)
-      listener_.say(fmt::format("advice: {} more warnings are in {}", aligned->warnings.size() - k_told,
-                                (out_ / "align.json").string()));
+    if (aligned->warnings.size() > k_most_printed)
+      listener_.say(fmt::format("advice: {} more warnings are in {}",
+                                aligned->warnings.size() - k_most_printed, (out_ / "align.json").string()));
     end(WizardStep::align,
         fmt::format("scan and CAD differ by {:.2f} mm RMS (start: {})", *seen_.align_rms_mm, aligned->how));
     return {};

@@ -108,18 +108,18 @@ class FaultTeller {
   void report_progress(const std::vector<calib::Fault>& faults) {
     std::set<calib::FaultName> names;
     for (const calib::Fault& fault : faults) {
-      const bool is_new = names.insert(fault.name).second && !told_.contains(fault.name);
+      const bool is_new = names.insert(fault.name).second && !reported_.contains(fault.name);
       if (is_new)
         say_(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
     }
-    for (const calib::FaultName name : told_)
+    for (const calib::FaultName name : reported_)
       if (!names.contains(name)) say_(fmt::format("fault {} is gone", calib::to_text(name)));
-    told_ = std::move(names);
+    reported_ = std::move(names);
   }
 
  private:
   const Say& say_;
-  std::set<calib::FaultName> told_;
+  std::set<calib::FaultName> reported_;
 };
 
 // One run of the wizard, pose by pose.
@@ -142,7 +142,7 @@ class Run {
       LIMN_TRY_STATUS(capture_pose(number, place, files));
       judged.capture_s = clock_.total() - before_s;
     }
-    if (listener_.judges) listener_.judges(number);
+    if (listener_.judging_begins) listener_.judging_begins(number);
     LIMN_TRY_STATUS(observe(files));
     judge(&judged);
     listener_.say(line_of(judged));
@@ -184,7 +184,7 @@ class Run {
 
   // Checks the devices, once in a run; their latencies are stored beside the captures.
   Status check() {
-    LIMN_TRY(const CheckedDevices checked, checked_devices(captures_, backend_, listener_));
+    LIMN_TRY(const CheckedDevices checked, check_devices(captures_, backend_, listener_));
     are_checked_ = true;
     ordered_json json = {{"schema", "limn.latency/1"}, {"projectors", ordered_json::array()}};
     for (std::size_t i = 0; i < checked.latency.size(); ++i)
@@ -200,7 +200,7 @@ class Run {
     for (bool is_again = true; is_again;) {
       listener_.say(
           fmt::format("{}: hold the board as follows in the first camera's image: {}", files.name, place));
-      if (listener_.aims) listener_.aims(number);
+      if (listener_.pose_begins) listener_.pose_begins(number);
       step(WizardStep::board, WizardState::runs, files.name);
       remove_images(files);
       if (const Status held = backend_.wait_for_board(number, nullptr); !held) {
@@ -250,7 +250,7 @@ Result<calib::Report> solve_all(const WizardOptions& options, const calib::Captu
     if (!is_complete(files) && fs::is_directory(captures.folder / files.name))
       solving.skip_poses.push_back(files.name);
   }
-  return solved(solving);
+  return solve_captures(solving);
 }
 
 // The latencies that this run or an earlier one measured; empty if none did.
@@ -278,12 +278,12 @@ Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, 
 
 }  // namespace
 
-Result<Calibrated> calibrated(const WizardOptions& options,
-                              const std::string& plan_json,
-                              const calib::CaptureSet& captures,
-                              const std::vector<std::string>& places,
-                              const WizardBackend& backend,
-                              const WizardListener& listener) {
+Result<Calibrated> calibrate_rig(const WizardOptions& options,
+                                 const std::string& plan_json,
+                                 const calib::CaptureSet& captures,
+                                 const std::vector<std::string>& places,
+                                 const WizardBackend& backend,
+                                 const WizardListener& listener) {
   const auto begun = std::chrono::steady_clock::now();
   const int count = static_cast<int>(places.size());
   LIMN_TRY_STATUS(open_captures(captures, plan_json));

@@ -43,11 +43,11 @@ struct Calibrated {
 /// solved as limn solve does it. `places`: for each pose, where to hold the board, as text. Captures of
 /// another plan are an error that says what differs; `plan_json` describes this plan. After a failure, the
 /// images stay on the disk, and the next run continues from them. If a person leaves, this is an error, too.
-Result<Calibrated> calibrated(const WizardOptions& options,
-                              const std::string& plan_json,
-                              const calib::CaptureSet& captures,
-                              const std::vector<std::string>& places,
-                              const WizardBackend& backend,
-                              const WizardListener& listener);
+Result<Calibrated> calibrate_rig(const WizardOptions& options,
+                                 const std::string& plan_json,
+                                 const calib::CaptureSet& captures,
+                                 const std::vector<std::string>& places,
+                                 const WizardBackend& backend,
+                                 const WizardListener& listener);
 
 }  // namespace limn::wizard

@@ -25,9 +25,9 @@ struct WizardListener {
   std::function<void(const std::string& line)> say;
   std::function<void(WizardStep step, WizardState state, const std::string& words)> step = nullptr;
   std::function<void(const std::vector<ExposureReading>&)> on_light = nullptr;
-  std::function<void(int pose)> aims = nullptr;                ///< the capture of a pose begins
+  std::function<void(int pose)> pose_begins = nullptr;         ///< the capture of a pose begins
   std::function<void(const calib::Report&)> solved = nullptr;  ///< the rig is saved
-  std::function<void(int pose)> judges = nullptr;              ///< decoding and judging of a pose begin
+  std::function<void(int pose)> judging_begins = nullptr;      ///< decoding and judging of a pose begin
   /// A pose was judged; the observations are those of all poses so far.
   std::function<void(const PoseJudged&, const calib::Observations&, const std::vector<calib::Fault>&)>
       judged = nullptr;

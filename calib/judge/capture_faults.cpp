@@ -52,7 +52,7 @@ constexpr double k_saturated_share = 0.2;
 constexpr double k_wave_level = 0.025;
 
 // All series of one camera and one projector.
-struct Seen {
+struct PairSeries {
   const Observed& observed;
   int camera = 0, projector = 0;
   std::vector<const CaptureQuality*> series;  // with enough illuminated samples
@@ -96,12 +96,12 @@ std::optional<Matrix2d> affine(const std::vector<const Match*>& matches) {
   return product * normal.inverse();
 }
 
-std::vector<Seen> seen_by_pairs(const Observed& observed) {
+std::vector<PairSeries> series_of_pairs(const Observed& observed) {
   const Observations& observations = observed.observations;
-  std::vector<Seen> pairs;
+  std::vector<PairSeries> pairs;
   for (int camera = 0; camera < static_cast<int>(observations.cameras.size()); ++camera) {
     for (int projector = 0; projector < static_cast<int>(observations.projectors.size()); ++projector) {
-      Seen seen{observed, camera, projector, {}, {}, {}};
+      PairSeries seen{observed, camera, projector, {}, {}, {}};
       const CapturedDevice& device = observations.cameras[static_cast<size_t>(camera)];
       for (const CaptureQuality& quality : observed.quality) {
         if (quality.camera == camera && quality.projector == projector && quality.samples >= k_least_samples)
@@ -124,11 +124,11 @@ std::vector<Seen> seen_by_pairs(const Observed& observed) {
   return pairs;
 }
 
-void note_dark(const Observed& observed, const std::vector<Seen>& pairs, std::vector<Fault>* faults) {
+void note_dark(const Observed& observed, const std::vector<PairSeries>& pairs, std::vector<Fault>* faults) {
   for (size_t projector = 0; projector < observed.observations.projectors.size(); ++projector) {
     double best = 0;
     size_t poses = 0, with_labels = 0;
-    for (const Seen& seen : pairs) {
+    for (const PairSeries& seen : pairs) {
       if (seen.projector != static_cast<int>(projector)) continue;
       best = std::max(best, median(seen.lit));
       poses = std::max(poses, seen.lit.size());
@@ -189,7 +189,7 @@ void note_same_light(const Observations& observations, std::vector<Fault>* fault
   }
 }
 
-void note_mirrored(const Seen& seen, std::vector<Fault>* faults) {
+void note_mirrored(const PairSeries& seen, std::vector<Fault>* faults) {
   const auto against = std::count_if(seen.maps.begin(), seen.maps.end(),
                                      [](const Matrix2d& map) { return map.determinant() < 0; });
   if (2 * static_cast<size_t>(against) <= seen.maps.size()) return;
@@ -211,7 +211,7 @@ struct Pairs {
   size_t per_axis(int axis) const { return axis == 0 ? columns : count - columns; }
 };
 
-Pairs pairs_of(const Seen& seen, const CaptureQuality& quality) {
+Pairs pairs_of(const PairSeries& seen, const CaptureQuality& quality) {
   const CapturedDevice& device = seen.observed.observations.projectors[static_cast<size_t>(seen.projector)];
   const int columns = static_cast<int>(std::bit_width(static_cast<unsigned>(device.width - 1)));
   const int rows = static_cast<int>(std::bit_width(static_cast<unsigned>(device.height - 1)));
@@ -229,7 +229,7 @@ struct Between {
   double off = 0, darker = 0;
 };
 
-Between between(const Seen& seen, const CaptureQuality& quality) {
+Between between(const PairSeries& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
   Between worst;
   for (const int axis : {0, 1}) {
@@ -242,7 +242,7 @@ Between between(const Seen& seen, const CaptureQuality& quality) {
   return worst;
 }
 
-void note_between(const Seen& seen, std::vector<Fault>* faults) {
+void note_between(const PairSeries& seen, std::vector<Fault>* faults) {
   const double off = seen.median_of([&](const CaptureQuality& h) { return between(seen, h).off; });
   const double darker = seen.median_of([&](const CaptureQuality& h) { return between(seen, h).darker; });
   if (off < k_between || darker < k_between_level) return;
@@ -258,7 +258,7 @@ void note_between(const Seen& seen, std::vector<Fault>* faults) {
 }
 
 // Range of the sums of pairs with wide stripes, which blur does not affect, and of white and black.
-double level_range(const Seen& seen, const CaptureQuality& quality) {
+double level_range(const PairSeries& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
   double low = 1, high = 1;
   const auto collect = [&](const GroupQuality& group) {
@@ -276,7 +276,7 @@ double level_range(const Seen& seen, const CaptureQuality& quality) {
 
 // Contrast of white against black divided by that of the widest stripes: 1 when nothing reacts to how much of
 // the image is bright. Over narrow stripes, which blur, it is larger.
-double white_contrast(const Seen& seen, const CaptureQuality& quality) {
+double white_contrast(const PairSeries& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
   double widest = 1e-9;
   for (const int axis : {0, 1}) {
@@ -287,7 +287,7 @@ double white_contrast(const Seen& seen, const CaptureQuality& quality) {
   return quality.groups.back().contrast / widest;
 }
 
-bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
+bool note_exposure(const PairSeries& seen, std::vector<Fault>* faults) {
   const double range = seen.median_of([&](const CaptureQuality& h) { return level_range(seen, h); });
   const double white = seen.median_of([&](const CaptureQuality& h) { return white_contrast(seen, h); });
   const bool narrow = seen.series[0]->widest_stripe_px < k_wide_stripe_px;
@@ -303,7 +303,7 @@ bool note_exposure(const Seen& seen, std::vector<Fault>* faults) {
   return true;
 }
 
-void note_motion(const Seen& seen, std::vector<Fault>* faults) {
+void note_motion(const PairSeries& seen, std::vector<Fault>* faults) {
   const CapturedDevice& camera = seen.observed.observations.cameras[static_cast<size_t>(seen.camera)];
   const double limit = std::max(k_shift_px, k_shift_share * camera.width);
   for (const CaptureQuality* quality : seen.series) {
@@ -327,7 +327,7 @@ struct Sharpness {
   int stripe_px = 2;
 };
 
-Sharpness sharpness(const Seen& seen, const CaptureQuality& quality) {
+Sharpness sharpness(const PairSeries& seen, const CaptureQuality& quality) {
   const Pairs pairs = pairs_of(seen, quality);
   std::vector<double> scales;  // camera pixels per projector pixel
   for (const Matrix2d& map : seen.maps) scales.push_back(1 / std::sqrt(std::abs(map.determinant())));
@@ -346,7 +346,7 @@ Sharpness sharpness(const Seen& seen, const CaptureQuality& quality) {
   return found;
 }
 
-void note_defocus(const Seen& seen, std::vector<Fault>* faults) {
+void note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
   const double contrast =
       seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
   if (contrast >= k_sharp) return;
@@ -372,7 +372,7 @@ double power_of_waves(double mean) {
   return std::sqrt(low * high);
 }
 
-void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
+void note_gamma(const PairSeries& seen, std::vector<Fault>* faults) {
   const double level = seen.median_of([](const CaptureQuality& h) { return h.wave_level; });
   if (std::abs(level - 0.5) < k_wave_level) return;
   const double power = power_of_waves(level);
@@ -389,7 +389,7 @@ void note_gamma(const Seen& seen, std::vector<Fault>* faults) {
            power)});
 }
 
-bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
+bool note_room_light(const PairSeries& seen, std::vector<Fault>* faults) {
   const double share = seen.median_of([](const CaptureQuality& h) {
     return std::max(0.0, h.black_level - k_pedestal) / std::max(k_pedestal, h.white_level - k_pedestal);
   });
@@ -405,7 +405,7 @@ bool note_room_light(const Seen& seen, std::vector<Fault>* faults) {
   return true;
 }
 
-bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
+bool note_saturation(const PairSeries& seen, std::vector<Fault>* faults) {
   const double share = seen.median_of([](const CaptureQuality& h) { return h.saturated; });
   if (share < k_saturated_share) return false;
   faults->push_back(
@@ -415,7 +415,7 @@ bool note_saturation(const Seen& seen, std::vector<Fault>* faults) {
   return true;
 }
 
-void note_odd_images(const Seen& seen, std::vector<Fault>* faults) {
+void note_odd_images(const PairSeries& seen, std::vector<Fault>* faults) {
   for (const CaptureQuality* quality : seen.series) {
     if (quality->odd.empty()) continue;
     const OddImage& odd = quality->odd.front();
@@ -476,10 +476,10 @@ std::vector<Fault> unsolved_faults(const Observed& observed) {
 
 std::vector<Fault> capture_faults(const Observed& observed) {
   std::vector<Fault> faults;
-  const std::vector<Seen> pairs = seen_by_pairs(observed);
+  const std::vector<PairSeries> pairs = series_of_pairs(observed);
   note_dark(observed, pairs, &faults);
   note_same_light(observed.observations, &faults);
-  for (const Seen& seen : pairs) {
+  for (const PairSeries& seen : pairs) {
     note_mirrored(seen, &faults);
     if (seen.series.empty()) continue;
     note_between(seen, &faults);

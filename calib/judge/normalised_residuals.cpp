@@ -87,14 +87,15 @@ Matrix2d predicted_covariance(const Observations& observations,
                      {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
                      match.px_camera, &px, &d))
     return none;
-  const int eye = camera_at(solution, match.camera), eye_values = camera.lens.model.value_count();
-  const int light = solution.projector_at(static_cast<size_t>(match.projector)),
-            light_values = projector.lens.model.value_count();
+  const int camera_column = camera_at(solution, match.camera),
+            camera_values = camera.lens.model.value_count();
+  const int projector_column = solution.projector_at(static_cast<size_t>(match.projector)),
+            projector_values = projector.lens.model.value_count();
   MatrixXd sensitivity = d.board_pose * by.by_devices;
-  sensitivity.middleCols(eye, eye_values) += d.camera_values;
-  sensitivity.middleCols(eye + eye_values, 6) += d.camera_pose;
-  sensitivity.middleCols(light, light_values) += d.projector_values;
-  sensitivity.middleCols(light + light_values, 6) += d.projector_pose;
+  sensitivity.middleCols(camera_column, camera_values) += d.camera_values;
+  sensitivity.middleCols(camera_column + camera_values, 6) += d.camera_pose;
+  sensitivity.middleCols(projector_column, projector_values) += d.projector_values;
+  sensitivity.middleCols(projector_column + projector_values, 6) += d.projector_pose;
   return widened * sensitivity * solution.covariance * sensitivity.transpose() +
          d.board_pose * by.covariance * d.board_pose.transpose() +
          match_variance(solution, match) * Matrix2d::Identity();

@@ -38,17 +38,17 @@ Matrix3d cross(const Vector3d& v) {
 }
 
 // The pixel of a world point in an imager, and its derivatives.
-struct Seen {
+struct ProjectedPoint {
   Vector2d px;
   Eigen::Matrix<double, 2, 3> by_point;   // derivative by the point, world axes
   Eigen::Matrix<double, 2, 6> by_imager;  // derivative by the imager's pose (boxplus's perturbation)
   Derivatives::Values by_values;
 };
 
-std::optional<Seen> project_with_derivatives(const Imager& imager, const Vector3d& p_world) {
+std::optional<ProjectedPoint> project_with_derivatives(const Imager& imager, const Vector3d& p_world) {
   const Vector3d p = imager.imager_from_world * p_world;
   if (!imager.lens.project(p)) return std::nullopt;  // project() detects where a polynomial has folded back
-  Seen seen;
+  ProjectedPoint seen;
   Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_p;
   seen.by_values.resize(2, imager.lens.model.value_count());
   if (!imager.lens.model.project(imager.lens.values, p, &seen.px, by_p.data(), seen.by_values.data()) ||

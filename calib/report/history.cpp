@@ -86,7 +86,7 @@ double median_shift(const Imager& before, const Imager& now, const std::vector<V
   return median(std::move(shifts), std::numeric_limits<double>::infinity());
 }
 
-Imager seen_from(const Imager& imager, const Imager& camera) {
+Imager relative_to(const Imager& imager, const Imager& camera) {
   Imager made = imager;
   made.imager_from_world = imager.imager_from_world * camera.imager_from_world.inverse();
   return made;
@@ -118,12 +118,13 @@ std::vector<DeviceMove> device_moves(const Rig& earlier,
                                      const Observations& observations,
                                      const Solution& solution) {
   std::vector<DeviceMove> all;
-  const Imager& eye = solution.rig.cameras.front();
-  const Imager* eye_before = same_device(earlier.cameras, eye);
-  if (!eye_before) return all;
+  const Imager& reference = solution.rig.cameras.front();
+  const Imager* reference_before = same_device(earlier.cameras, reference);
+  if (!reference_before) return all;
   const auto compare = [&](const Imager& device, const Imager* earlier_device, bool is_projector, size_t i) {
     if (!earlier_device) return;
-    const Imager before = seen_from(*earlier_device, *eye_before), now = seen_from(device, eye);
+    const Imager before = relative_to(*earlier_device, *reference_before),
+                 now = relative_to(device, reference);
     const Pose &a = before.imager_from_world, &b = now.imager_from_world;
     all.push_back(
         {device.name, angle_between(a.rotation, b.rotation) * 180 / std::numbers::pi,

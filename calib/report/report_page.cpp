@@ -145,7 +145,7 @@ std::string poses_html(const Report& report) {
 }
 
 struct Fields {
-  std::vector<FieldPoint> fitted, foretold;
+  std::vector<FieldPoint> fitted, predicted;
 };
 
 std::string imager_figure(const CapturedDevice& device,
@@ -173,18 +173,18 @@ std::string imagers_html(const Report& report) {
     html += imager_figure(observations.cameras[i], points, report.assessment.devices[i], "board corners");
   }
   for (size_t i = 0; i < observations.projectors.size(); ++i) {
-    std::vector<FieldPoint> fitted, foretold;
+    std::vector<FieldPoint> fitted, predicted;
     for (size_t k = 0; k < observations.matches.size(); ++k) {
       const Match& match = observations.matches[k];
       if (static_cast<size_t>(match.projector) != i) continue;
       fitted.push_back({match.px_projector, solution.match_residuals[k], solution.match_outlier[k]});
       const Vector2d& error = report.assessment.held_out.residuals[k];
-      if (error.allFinite()) foretold.push_back({match.px_projector, error, false});
+      if (error.allFinite()) predicted.push_back({match.px_projector, error, false});
     }
     const CapturedDevice& device = observations.projectors[i];
     html +=
         imager_figure(device, fitted, report.assessment.devices[observations.cameras.size() + i], "matches");
-    const SvgPlot plot = residual_field(device.width, device.height, foretold);
+    const SvgPlot plot = residual_field(device.width, device.height, predicted);
     html += html_figure(
         plot.svg, device.name + ", held-out poses",
         fmt::format("prediction by a solve without the pose: 95 % within {:.2f} mm on the board. {}.",

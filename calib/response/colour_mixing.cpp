@@ -72,7 +72,7 @@ double held_out_rms(const ResponseShots& shots,
   const cv::Mat white = shots.images[images_of(Role::white)[0]].reshape(1);
   double squares = 0, count = 0;
   for (const size_t image : images_of(Role::check)) {
-    const cv::Mat foretold =
+    const cv::Mat predicted =
         predicted_photograph(mixing, projector, camera, response_images()[image].bgr).reshape(1);
     const cv::Mat taken = shots.images[image].reshape(1);
     for (int r = 0; r < taken.rows; ++r)
@@ -80,7 +80,7 @@ double held_out_rms(const ResponseShots& shots,
         constexpr int k_lit = 10;  // levels
         if (white.at<uchar>(r, c) - black.at<uchar>(r, c) < k_lit || taken.at<uchar>(r, c) >= k_clipped)
           continue;
-        const double off = foretold.at<float>(r, c) - taken.at<uchar>(r, c);
+        const double off = predicted.at<float>(r, c) - taken.at<uchar>(r, c);
         if (std::isnan(off)) continue;
         squares += off * off;
         count += 1;

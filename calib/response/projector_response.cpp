@@ -149,16 +149,16 @@ double worst_jump(const Ramp& ramp,
   double jump = 0;
   for (size_t i = 1; i + 1 < shares.size(); ++i) {
     const size_t first = std::clamp<size_t>(i < 2 ? 0 : i - 2, 0, shares.size() - 5);
-    double foretold = 0, noise = stddevs[i];  // Lagrange
+    double predicted = 0, noise = stddevs[i];  // Lagrange
     for (size_t j = first; j < first + 5; ++j) {
       if (j == i) continue;
       double weight = 1;
       for (size_t k = first; k < first + 5; ++k)
         if (k != j && k != i) weight *= (ramp.values[i] - ramp.values[k]) / (ramp.values[j] - ramp.values[k]);
-      foretold += weight * root_of(shares[j]);
+      predicted += weight * root_of(shares[j]);
       noise += std::abs(weight) * stddevs[j];
     }
-    const double off = std::abs(root_of(shares[i]) - foretold) - k_sure * noise;
+    const double off = std::abs(root_of(shares[i]) - predicted) - k_sure * noise;
     if (off > jump) jump = off, *worst = i;
   }
   return jump;

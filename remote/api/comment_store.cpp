@@ -20,14 +20,14 @@ void CommentStore::load_once(const std::filesystem::path& scene_folder) {
 
 std::optional<HttpResponse> CommentStore::add(const AuthSessions::Guest& guest,
                                               const CommentRequest& request,
-                                              const SessionNews* news,
+                                              const SessionUpdate* update,
                                               Saved saved) {
   if (guest.role < Role::work) return role_refusal(guest, "comment", Role::work);
-  if (!comments_ || !news) return error_response(k_http_unavailable, "the session has not begun yet.");
+  if (!comments_ || !update) return error_response(k_http_unavailable, "the session has not begun yet.");
   if (!*comments_) return error_response(k_http_unavailable, comments_->message());
-  if (!request.slot.empty() && !news->scene->find_slot(request.slot))
+  if (!request.slot.empty() && !update->scene->find_slot(request.slot))
     return error_response(k_http_bad_request, "slot: expected one of the state, found another.");
-  const std::vector<std::string>& looks = news->state.looks;
+  const std::vector<std::string>& looks = update->state.looks;
   if (!request.look.empty() && std::find(looks.begin(), looks.end(), request.look) == looks.end())
     return error_response(k_http_bad_request, "look: expected one of the state, found another.");
   auto comment = scene::make_comment(guest.name, request.look, request.slot, request.text);
@@ -38,7 +38,7 @@ std::optional<HttpResponse> CommentStore::add(const AuthSessions::Guest& guest,
                           fmt::format("the project keeps {} comments at most.", all.size()));
   all.push_back(std::move(*comment));
   const bool is_queued = worker_->add_job(
-      [post = post_, all, saved = std::move(saved), path = news->scene->folder / k_comments_file] {
+      [post = post_, all, saved = std::move(saved), path = update->scene->folder / k_comments_file] {
         const Status status = scene::save_comments(path, all);
         post([saved, why = status ? "" : status.message()] { saved(why); });
       });

@@ -11,7 +11,7 @@
 #include "core/worker_thread.h"
 #include "remote/api/auth_sessions.h"
 #include "remote/api/messages.h"
-#include "remote/api/session_news.h"
+#include "remote/api/session_update.h"
 #include "remote/http/http.h"
 #include "remote/http/http_handler.h"
 #include "scene/comments.h"
@@ -34,12 +34,12 @@ class CommentStore {
   /// can be added.
   void load_once(const std::filesystem::path& scene_folder);
 
-  /// Adds a comment and saves all. `news` is null before the session has begun. A refusal: the guest's role
+  /// Adds a comment and saves all. `update` is null before the session has begun. A refusal: the guest's role
   /// is too low, there is no session yet, the slot or the look does not exist, the text is refused, or there
   /// are too many comments; then `saved` is not called.
   std::optional<HttpResponse> add(const AuthSessions::Guest& guest,
                                   const CommentRequest& request,
-                                  const SessionNews* news,
+                                  const SessionUpdate* update,
                                   Saved saved);
 
   /// The newest k_max_published_comments, the newest last. Valid until the next add().

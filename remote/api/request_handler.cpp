@@ -144,19 +144,19 @@ void RequestHandler::get_room_image(const AuthenticatedRequest& request, Respons
 }
 
 void RequestHandler::get_projector_image(const AuthenticatedRequest& request, ResponseCallback respond) {
-  session_files_.send_projector_image(request.path, state_.news(), std::move(respond));
+  session_files_.send_projector_image(request.path, state_.update(), std::move(respond));
 }
 
 void RequestHandler::get_look_image(const AuthenticatedRequest& request, ResponseCallback respond) {
-  session_files_.send_look_image(request.path, state_.news(), std::move(respond));
+  session_files_.send_look_image(request.path, state_.update(), std::move(respond));
 }
 
 void RequestHandler::get_look_assembly(const AuthenticatedRequest& request, ResponseCallback respond) {
-  session_files_.send_look_assembly(request.path, state_.news(), std::move(respond));
+  session_files_.send_look_assembly(request.path, state_.update(), std::move(respond));
 }
 
 void RequestHandler::get_variant_image(const AuthenticatedRequest& request, ResponseCallback respond) {
-  session_files_.send_variant_image(request.path, state_.news(), std::move(respond));
+  session_files_.send_variant_image(request.path, state_.update(), std::move(respond));
 }
 
 void RequestHandler::post_comment(const AuthenticatedRequest& request, ResponseCallback respond) {
@@ -290,7 +290,7 @@ std::optional<HttpResponse> RequestHandler::add_comment(const AuthSessions::Gues
                                                         const CommentRequest& comment,
                                                         EditCallback callback) {
   auto refusal = comments_.add(
-      guest, comment, state_.news(),
+      guest, comment, state_.update(),
       [this, callback = std::move(callback)](const std::string& why) { callback(why, state_.number()); });
   if (!refusal) publish_state();
   return refusal;
@@ -298,10 +298,10 @@ std::optional<HttpResponse> RequestHandler::add_comment(const AuthSessions::Gues
 
 // ---- The session and time ----
 
-void RequestHandler::update_news(SessionNews news) {
-  const std::vector<EditResult> results = std::exchange(news.edit_results, {});
-  state_.set_news(std::move(news));
-  comments_.load_once(state_.news()->scene->folder);
+void RequestHandler::apply_update(SessionUpdate update) {
+  const std::vector<EditResult> results = std::exchange(update.edit_results, {});
+  state_.set_update(std::move(update));
+  comments_.load_once(state_.update()->scene->folder);
   publish_state();
   edits_.finish(results, state_.number());
 }

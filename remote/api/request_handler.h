@@ -17,7 +17,7 @@
 #include "remote/api/pending_edits.h"
 #include "remote/api/room_image_publisher.h"
 #include "remote/api/session_files.h"
-#include "remote/api/session_news.h"
+#include "remote/api/session_update.h"
 #include "remote/api/state_publisher.h"
 #include "remote/api/tablet_windows.h"
 #include "remote/api/ws_client.h"
@@ -60,8 +60,8 @@ class RequestHandler : public HttpHandler {
 
   /// Until then, only guests of this role or a higher one see images of the room.
   void hide_room(Role role, Clock::time_point until) { room_images_.hide(role, until); }
-  /// Publishes the session's news and answers the edits that it has finished.
-  void update_news(SessionNews news);
+  /// Publishes the session's update and answers the edits that it has finished.
+  void apply_update(SessionUpdate update);
   /// Destroys the image providers, which answer for the last time. Call it when the network's thread has
   /// ended.
   void release_image_providers() { setup_.providers = {}; }

@@ -50,17 +50,18 @@ void SessionFiles::respond_from_worker(std::function<HttpResponse()> job, Respon
 }
 
 void SessionFiles::send_projector_image(const std::string& path,
-                                        const SessionNews* news,
+                                        const SessionUpdate* update,
                                         ResponseCallback respond) {
   const auto name = name_in(path, "/picture/projector/", ".jpg");
   std::size_t index = 0;
-  const std::size_t count = news ? std::min(news->state.projectors.size(), news->projector_images.size()) : 0;
-  while (name && index < count && news->state.projectors[index] != *name) ++index;
-  if (!name || index >= count || news->projector_images[index].empty())
+  const std::size_t count =
+      update ? std::min(update->state.projectors.size(), update->projector_images.size()) : 0;
+  while (name && index < count && update->state.projectors[index] != *name) ++index;
+  if (!name || index >= count || update->projector_images[index].empty())
     return respond(
         error_response(k_http_not_found, "expected a projector of the state, found another name."));
   respond_from_worker(
-      [cache = encoded_projectors_, name = *name, image = news->projector_images[index]] {
+      [cache = encoded_projectors_, name = *name, image = update->projector_images[index]] {
         EncodedImage& encoded = (*cache)[name];
         if (!encoded.jpeg || encoded.image.data != image.data) {
           const auto jpeg = device::encode_jpeg(image, k_projector_jpeg_quality);
@@ -72,17 +73,17 @@ void SessionFiles::send_projector_image(const std::string& path,
 }
 
 void SessionFiles::send_look_image(const std::string& path,
-                                   const SessionNews* news,
+                                   const SessionUpdate* update,
                                    ResponseCallback respond) {
   const auto name = name_in(path, "/picture/look/", ".png");
   const auto is_look = [&] {
-    const std::vector<std::string>& looks = news->state.looks;
+    const std::vector<std::string>& looks = update->state.looks;
     return std::find(looks.begin(), looks.end(), *name) != looks.end();
   };
-  if (!name || !news || !is_look())
+  if (!name || !update || !is_look())
     return respond(error_response(k_http_not_found, "expected a look of the state, found another name."));
   respond_from_worker(
-      [file = news->scene->folder / "looks" / (*name + ".png")] {
+      [file = update->scene->folder / "looks" / (*name + ".png")] {
         auto png = read_file(file);
         return png ? uncached_response("image/png", std::move(*png))
                    : error_response(k_http_not_found, "this look has no picture.");
@@ -91,17 +92,17 @@ void SessionFiles::send_look_image(const std::string& path,
 }
 
 void SessionFiles::send_look_assembly(const std::string& path,
-                                      const SessionNews* news,
+                                      const SessionUpdate* update,
                                       ResponseCallback respond) {
   const auto name = name_in(path, "/look/", ".glb");
   const scene::Look* look = nullptr;
-  if (name && news)
-    for (const scene::Look& each : news->looks)
+  if (name && update)
+    for (const scene::Look& each : update->looks)
       if (each.name == *name) look = &each;
   if (!look)
     return respond(error_response(k_http_not_found, "expected a look of the state, found another name."));
   respond_from_worker(
-      [scene = news->scene, look = *look] {
+      [scene = update->scene, look = *look] {
         const std::string bytes = look_assembly(*scene, look);
         return bytes.empty() ? error_response(k_http_not_found, "this look has no parts.")
                              : uncached_response("model/gltf-binary", bytes);
@@ -110,7 +111,7 @@ void SessionFiles::send_look_assembly(const std::string& path,
 }
 
 void SessionFiles::send_variant_image(const std::string& path,
-                                      const SessionNews* news,
+                                      const SessionUpdate* update,
                                       ResponseCallback respond) {
   constexpr std::string_view k_begin = "/picture/variant/";
   const auto slash = path.find('/', k_begin.size());
@@ -118,11 +119,11 @@ void SessionFiles::send_variant_image(const std::string& path,
                         ? std::nullopt
                         : decoded(std::string_view(path).substr(k_begin.size(), slash - k_begin.size()));
   const auto variant = name_in(path, path.substr(0, slash) + "/", ".png");
-  if (!slot || !variant || !news)
+  if (!slot || !variant || !update)
     return respond(
         error_response(k_http_not_found, "expected a slot and a variant of the state, found others."));
   respond_from_worker(
-      [thumbnails = thumbnails_, scene = news->scene, slot = *slot, variant = *variant] {
+      [thumbnails = thumbnails_, scene = update->scene, slot = *slot, variant = *variant] {
         const auto png = thumbnails->png(scene, slot, variant);
         return png ? uncached_response("image/png", **png) : error_response(k_http_not_found, png.message());
       },

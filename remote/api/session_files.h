@@ -7,27 +7,27 @@
 #include <string>
 
 #include "core/worker_thread.h"
-#include "remote/api/session_news.h"
+#include "remote/api/session_update.h"
 #include "remote/api/thumbnails.h"
 #include "remote/http/http.h"
 
 namespace limn::remote {
 
 /// Answers requests for images and files of the session: projectors, looks, variants. Files are read and
-/// images encoded on the worker thread; all calls come on the network's thread. `news` is null before the
+/// images encoded on the worker thread; all calls come on the network's thread. `update` is null before the
 /// session has begun. Status 404: the path names nothing of the session; 503: too many requests wait.
 class SessionFiles {
  public:
   explicit SessionFiles(WorkerThread* worker);
 
   /// /picture/projector/NAME.jpg: what a projector shows.
-  void send_projector_image(const std::string& path, const SessionNews* news, ResponseCallback respond);
+  void send_projector_image(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
   /// /picture/look/NAME.png: the image that was saved with a look.
-  void send_look_image(const std::string& path, const SessionNews* news, ResponseCallback respond);
+  void send_look_image(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
   /// /look/NAME.glb: the parts of a look on the prototype, in metres.
-  void send_look_assembly(const std::string& path, const SessionNews* news, ResponseCallback respond);
+  void send_look_assembly(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
   /// /picture/variant/SLOT/VARIANT.png: a variant by itself.
-  void send_variant_image(const std::string& path, const SessionNews* news, ResponseCallback respond);
+  void send_variant_image(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
 
  private:
   void respond_from_worker(std::function<HttpResponse()> job, ResponseCallback respond);

@@ -34,15 +34,15 @@ ordered_json numberless_state(const SessionState& session,
 
 }  // namespace
 
-void StatePublisher::set_news(SessionNews news) {
-  if (news_) news.state = without_jitter(std::move(news.state), news_->state);
-  news_ = std::move(news);
+void StatePublisher::set_update(SessionUpdate update) {
+  if (update_) update.state = without_jitter(std::move(update.state), update_->state);
+  update_ = std::move(update);
 }
 
 void StatePublisher::publish(std::span<const scene::Comment> comments) {
-  if (!news_) return;
-  ordered_json state = numberless_state(news_->state, *clients_, comments);
-  const auto& edited = news_->state.last_edit;
+  if (!update_) return;
+  ordered_json state = numberless_state(update_->state, *clients_, comments);
+  const auto& edited = update_->state.last_edit;
   const bool is_edited = edited && edited->count != edit_count_;
   std::string text = json_text(state);
   if (text == published_ && !is_edited) return;

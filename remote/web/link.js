@@ -23,7 +23,7 @@ export class Link extends EventTarget {
   #last_id = 0;
   #waiting = new Map(); // id -> {done, failed, timer} of edits that are not answered yet
   #wants_pictures = false;
-  #heard_at = 0;
+  #received_at = 0;
   status = "unpaired";
   role = "look";
   name = "";
@@ -77,7 +77,7 @@ export class Link extends EventTarget {
     if (!this.#tries) this.#say("connecting");
     const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/live`);
     socket.binaryType = "arraybuffer";
-    socket.onmessage = (event) => socket === this.#socket && this.#hear(event.data);
+    socket.onmessage = (event) => socket === this.#socket && this.#receive(event.data);
     socket.onclose = () => socket === this.#socket && this.#closed();
     this.#socket = socket;
   }
@@ -100,7 +100,7 @@ export class Link extends EventTarget {
   want_pictures(wants) {
     if (wants === this.#wants_pictures) return;
     this.#wants_pictures = wants;
-    this.#heard_at = Date.now();
+    this.#received_at = Date.now();
     this.send({ type: "pictures", room: wants });
   }
 
@@ -123,9 +123,9 @@ export class Link extends EventTarget {
     else asked.failed(new Error(why));
   }
 
-  #hear(data) {
-    this.#heard_at = Date.now();
-    if (data instanceof ArrayBuffer) return this.#hear_picture(data);
+  #receive(data) {
+    this.#received_at = Date.now();
+    if (data instanceof ArrayBuffer) return this.#receive_picture(data);
     const message = JSON.parse(data);
     if (message.type === "hello") {
       this.#tries = 0;
@@ -145,7 +145,7 @@ export class Link extends EventTarget {
     }
   }
 
-  #hear_picture(data) {
+  #receive_picture(data) {
     const head = new DataView(data);
     const kind = head.getUint32(0, true),
       number = head.getUint32(4, true),
@@ -176,9 +176,9 @@ export class Link extends EventTarget {
   }
 
   async #look_into() {
-    const is_silent = Date.now() - this.#heard_at > k_silence_ms;
+    const is_silent = Date.now() - this.#received_at > k_silence_ms;
     if (this.status !== "connected" || !this.#wants_pictures || document.hidden || !is_silent) return;
-    this.#heard_at = Date.now();
+    this.#received_at = Date.now();
     if ((await this.#probe()) === 0 && this.status === "connected") this.#closed();
   }
 

@@ -6,16 +6,16 @@ import { make_material } from "/shading.js";
 
 const k_steps_mm = ["0.1", "1", "5"];
 const k_units = ["mm", "cm", "m", "in", "ft"];
-const k_sight = { seen: "seen", "carried on": "predicted", lost: "not seen" };
+const k_tracking = { seen: "seen", "carried on": "predicted", lost: "not seen" };
 
 const part_url = (slot, variant) => `/picture/variant/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.png`;
 
 /** A badge with a marker's tracking state, distinguished by word, colour and shape. */
-export function sight_badge() {
+export function tracking_badge() {
   const badge = h("span", { class: "badge" });
   badge.show = (sight) => {
     badge.dataset.sight = sight;
-    set_text(badge, k_sight[sight] ?? sight);
+    set_text(badge, k_tracking[sight] ?? sight);
   };
   return badge;
 }
@@ -202,7 +202,7 @@ function make_units(session, slot) {
 function make_slot(session, slot) {
   const picture = h("canvas", { class: "thumb", "aria-hidden": "true", width: "4", height: "4" });
   const variant = h("span", { class: "soft" });
-  const sight = sight_badge();
+  const sight = tracking_badge();
   const id = `more-${slot.name}`;
   const more = h("div", { class: "more stack", id, hidden: true });
   const head = h(

@@ -1,12 +1,12 @@
 // The panel Room: tracking, devices, people, comments, messages of the session.
 import { make_comments } from "/comments.js";
 import { by_id, h, keep, set_text } from "/dom.js";
-import { sight_badge } from "/parts.js";
+import { tracking_badge } from "/parts.js";
 
 const k_most_notes = 20; // only the newest are shown
 
 function row(name) {
-  const badge = sight_badge(),
+  const badge = tracking_badge(),
     words = h("span", { class: "soft small" });
   const node = h("li", {}, h("b", {}, name), words, badge);
   node.show = (sight, text) => {

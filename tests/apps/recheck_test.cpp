@@ -67,7 +67,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
 
   RecheckCommand sound{.rig = folder / "rig", .plan = plan_of(sound_world), .out = folder / "before"};
-  const auto before = rechecked(sound);
+  const auto before = recheck(sound);
   ASSERT_TRUE(before) << before.message();
   EXPECT_EQ(before->result.verdict, RigVerdict::sound);
   // In 15 s there are 150 images at ten per second, enough for six projectors of this size.
@@ -76,7 +76,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
             load_rig(sound.rig).value().projectors[0].imager_from_world.matrix());
 
   RecheckCommand nudged{.rig = folder / "rig", .plan = plan_of(nudged_world), .out = folder / "after"};
-  const auto undecided = rechecked(nudged);
+  const auto undecided = recheck(nudged);
   ASSERT_TRUE(undecided) << undecided.message();
   EXPECT_EQ(undecided->result.verdict, RigVerdict::undecided);
 
@@ -84,7 +84,7 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   RecheckCommand again{
       .rig = folder / "rig", .captures = nudged.out / "captures", .out = folder / "repaired"};
   again.still = sound.out / "recheck.json";
-  const auto after = rechecked(again);
+  const auto after = recheck(again);
   ASSERT_TRUE(after) << after.message();
   ASSERT_EQ(after->result.verdict, RigVerdict::moved);
   EXPECT_EQ(after->result.candidates[0].device, "projector0");
@@ -96,18 +96,18 @@ TEST(RecheckCommand, FindsAndRepairsANudgeOnTheVirtualRig) {
   EXPECT_EQ(repaired->projectors[0].lens.values, rig.projectors[0].lens.values);
   EXPECT_TRUE(fs::exists(again.out / "projector0.cameramodel"));
   EXPECT_EQ(read_json(again.out / "rig.json")["provenance"]["re_solved"]["device"], "projector0");
-  const Json told = read_json(again.out / "recheck.json");
-  EXPECT_EQ(told["verdict"], "nudged");
-  EXPECT_TRUE(told["boards"].contains("pose00"));
+  const Json report = read_json(again.out / "recheck.json");
+  EXPECT_EQ(report["verdict"], "nudged");
+  EXPECT_TRUE(report["boards"].contains("pose00"));
 
   // A reference without this pose, and a file that is no recheck.json.
-  Json other = told;
-  other["boards"] = {{"pose77", told["boards"]["pose00"]}};
+  Json other = report;
+  other["boards"] = {{"pose77", report["boards"]["pose00"]}};
   ASSERT_TRUE(write_file(folder / "other.json", other.dump()).ok());
   again.still = folder / "other.json";
-  EXPECT_NE(rechecked(again).message().find("other.json: boards: expected"), std::string::npos);
+  EXPECT_NE(recheck(again).message().find("other.json: boards: expected"), std::string::npos);
   again.still = again.out / "rig.json";
-  EXPECT_NE(rechecked(again).message().find("limn.recheck/1"), std::string::npos);
+  EXPECT_NE(recheck(again).message().find("limn.recheck/1"), std::string::npos);
 }
 
 // The studio with its prototype; projector1's target is raised by `up_m`.
@@ -130,8 +130,8 @@ TEST(RecheckCommand, ThePrototypeAloneTellsWhatMoved) {
   const Rig rig = sim::load_world(folder / "sound/world.json", tracker::marker_image).value().rig;
   const Rig truth = sim::load_world(folder / "nudged/world.json", tracker::marker_image).value().rig;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
-  const auto after = rechecked(
-      {.rig = folder / "rig", .plan = nudged_plan, .prototype = true, .out = folder / "nudged/out"});
+  const auto after =
+      recheck({.rig = folder / "rig", .plan = nudged_plan, .prototype = true, .out = folder / "nudged/out"});
   ASSERT_TRUE(after) << after.message();
   ASSERT_EQ(after->result.verdict, RigVerdict::moved);
   EXPECT_EQ(after->result.candidates[0].device, "projector1");
@@ -149,16 +149,16 @@ TEST(RecheckCommand, WantsCapturesOrAPlan) {
   const fs::path folder = test_folder();
   const Rig rig = sim::load_world(bench_world(folder / "world.json", 0), tracker::marker_image).value().rig;
   ASSERT_TRUE(save_rig(rig, folder / "rig").ok());
-  const auto neither = rechecked({.rig = folder / "rig", .out = folder / "out"});
+  const auto neither = recheck({.rig = folder / "rig", .out = folder / "out"});
   ASSERT_FALSE(neither);
   EXPECT_TRUE(neither.error().wrong_usage);
-  const auto no_plan = rechecked(
-      {.rig = folder / "rig", .captures = folder / "none", .prototype = true, .out = folder / "out"});
+  const auto no_plan =
+      recheck({.rig = folder / "rig", .captures = folder / "none", .prototype = true, .out = folder / "out"});
   EXPECT_TRUE(!no_plan && no_plan.error().wrong_usage);
   const auto devices =
-      rechecked({.rig = folder / "rig", .devices = folder / "devices.json", .out = folder / "out"});
+      recheck({.rig = folder / "rig", .devices = folder / "devices.json", .out = folder / "out"});
   EXPECT_NE(devices.message().find("devices.json"), std::string::npos);
-  const auto missing = rechecked({.rig = folder / "rig", .captures = folder / "none", .out = folder / "out"});
+  const auto missing = recheck({.rig = folder / "rig", .captures = folder / "none", .out = folder / "out"});
   EXPECT_NE(missing.message().find("capture.json"), std::string::npos);
   EXPECT_FALSE(fs::exists(folder / "out")) << "nothing is written when nothing was measured";
 }

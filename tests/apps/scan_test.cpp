@@ -238,9 +238,9 @@ TEST(Scan, LaysPosesOfAMovedPrototypeOntoEachOtherWhenTold) {
   command.rig = out / "rig";
   command.out = out / "scan";
   command.far_m = 1.75;  // in front of the wall
-  const Status untold = run_scan(command);
-  ASSERT_FALSE(untold.ok());
-  EXPECT_NE(untold.message().find("--moved"), std::string::npos) << untold.message();
+  const Status refused = run_scan(command);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.message().find("--moved"), std::string::npos) << refused.message();
   EXPECT_FALSE(fs::exists(command.out));
   command.moved = true;
   const Status done = run_scan(command);

@@ -36,7 +36,7 @@ using Eigen::Vector3d;
 
 // A camera and a shifted projector in front of a ChArUco board; images are drawn by intersecting camera rays
 // with the board and reading its texture and the pattern there.
-struct Stage {
+struct BoardAndProjector {
   Imager camera{"camera0", 640, 480,
                 Lens::create("LENSMODEL_OPENCV4", {800, 800, 322, 238, -0.1, 0.05, 0, 0}).value(), Pose()};
   Imager projector{
@@ -137,7 +137,7 @@ struct Stage {
 const fs::path& captured() {
   static const fs::path folder = [] {
     const fs::path made = test_folder() / "captures";
-    Stage().capture(made, 6);
+    BoardAndProjector().capture(made, 6);
     return made;
   }();
   return folder;
@@ -158,7 +158,7 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
   ASSERT_TRUE(status.ok()) << status.message();
   const auto rig = load_rig(out);
   ASSERT_TRUE(rig.ok()) << rig.message();
-  const Stage truth;
+  const BoardAndProjector truth;
   ASSERT_EQ(rig->projectors.size(), 1U);
   EXPECT_NEAR(rig->cameras[0].lens.fx(), truth.camera.lens.fx(), 4);
   EXPECT_NEAR(rig->projectors[0].lens.cy(), truth.projector.lens.cy(), 4);
@@ -257,10 +257,11 @@ TEST(SolveCommand, UsesASceneWithoutABoard) {
   const fs::path captures = own_captures();
   fs::remove_all(captures / "pose03");
   fs::remove_all(captures / "pose04");
-  Stage().capture(captures.parent_path() / "scene", 1, false);
+  BoardAndProjector().capture(captures.parent_path() / "scene", 1, false);
   fs::rename(captures.parent_path() / "scene" / "pose00", captures / "pose03");
   fs::remove_all(captures.parent_path() / "scene");
-  const auto report = wizard::solved({.captures = captures, .out = captures.parent_path() / "scene rig"});
+  const auto report =
+      wizard::solve_captures({.captures = captures, .out = captures.parent_path() / "scene rig"});
   ASSERT_TRUE(report.ok()) << report.message();
   const calib::Observations& seen = report->observed.observations;
   ASSERT_GT(seen.points.size(), 50U);
@@ -319,13 +320,13 @@ cv::Mat photograph_of_response(const cv::Mat& shown, int width, int height) {
 
 TEST(SolveCommand, MeasuresTheResponseFromImagesBesideThePoses) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig with response";
-  const Stage stage;
+  const BoardAndProjector truth;
   const fs::path folder = captures / "response" / "projector0" / "camera0";
   ASSERT_TRUE(make_folder(folder).ok());
   for (int i = 0; i < static_cast<int>(calib::response_images().size()); ++i) {
-    const cv::Mat shown = calib::draw_response(i, stage.projector.width, stage.projector.height);
+    const cv::Mat shown = calib::draw_response(i, truth.projector.width, truth.projector.height);
     ASSERT_TRUE(write_png(folder / calib::image_name(i),
-                          photograph_of_response(shown, stage.camera.width, stage.camera.height))
+                          photograph_of_response(shown, truth.camera.width, truth.camera.height))
                     .ok());
   }
   const Status status = run_solve({.captures = captures, .out = out});
@@ -380,14 +381,14 @@ TEST(SolveCommand, NamesCopiedImagesAndTheBoardThatWasReallyThere) {
 // The board is described with squares of 39 mm instead of 40: no residual shows it, but the scale bar does.
 TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig with bar";
-  const Stage stage;
+  const BoardAndProjector truth;
   const calib::CaptureSet plan = calib::plan_captures(
-      captures, {{stage.camera.name, stage.camera.width, stage.camera.height}},
-      {{stage.projector.name, stage.projector.width, stage.projector.height}}, stage.board);
-  for (const int pose : {6, 7}) stage.capture_bar(plan, pose);
+      captures, {{truth.camera.name, truth.camera.width, truth.camera.height}},
+      {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
+  for (const int pose : {6, 7}) truth.capture_bar(plan, pose);
   wizard::SolveCommandOptions options{.captures = captures, .out = out};
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm"};
-  const auto right = wizard::solved(options);
+  const auto right = wizard::solve_captures(options);
   ASSERT_TRUE(right.ok()) << right.message();
   ASSERT_EQ(right->scale_bar_lengths.size(), 1U);
   const calib::ScaleBarCheck& check = right->scale_bar_lengths[0];
@@ -404,7 +405,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
                     "charuco:8x6:39mm\", \"known_lengths\": [\"apriltag_36h11:3 apriltag_36h11:7 25cm\"]");
   ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
   options.scale_bar_lengths.clear();
-  const auto wrong = wizard::solved(options);
+  const auto wrong = wizard::solve_captures(options);
   ASSERT_TRUE(wrong.ok()) << wrong.message();
   ASSERT_EQ(wrong->scale_bar_lengths.size(), 1U);
   EXPECT_NEAR(wrong->scale_bar_lengths[0].measured_m, 0.250 * 39 / 40, 0.0015);
@@ -416,7 +417,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   EXPECT_NE(wrong->assessment.verdict, calib::Verdict::good);
 
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
-  const auto unseen = wizard::solved(options);
+  const auto unseen = wizard::solve_captures(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
   EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::scale_bar_not_seen);
   for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
@@ -434,7 +435,7 @@ TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
     for (int pose = 0; pose + 1 < 6; ++pose) fs::rename(stripes(pose + 1) / name, stripes(pose) / name);
     fs::rename(captures / "first.png", stripes(5) / name);
   }
-  const auto report = wizard::solved({.captures = captures, .out = out});
+  const auto report = wizard::solve_captures({.captures = captures, .out = out});
   if (!report) {
     EXPECT_GT(report.message().size(), 40U);
     EXPECT_FALSE(fs::exists(out / "rig.json"));
@@ -451,7 +452,7 @@ TEST(SolveCommand, ContradictionsAreRejectedWithFiniteNumbers) {
 
 TEST(SolveCommand, SaysThatNoBoardIsVisible) {
   const fs::path folder = test_folder();
-  Stage().capture(folder / "captures", 2, false);
+  BoardAndProjector().capture(folder / "captures", 2, false);
   const Status status = run_solve({.captures = folder / "captures", .out = folder / "rig"});
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.message().find("camera0"), std::string::npos) << status.message();

@@ -106,14 +106,14 @@ Result<calib::CaptureSet> captured(const TrueRig& truth, const fs::path& folder)
     world.objects = {bowed_board(truth, truth.world_from_board[pose])};
     const sim::Samples samples = sim::trace(world, 0);
     cv::Mat shown;
-    const calib::CaptureBackend stage{.show = [&](int, const cv::Mat& image) -> Status {
-                                        shown = image.clone();
-                                        return {};
-                                      },
-                                      .grab = [&](int) -> Result<cv::Mat> {
-                                        return sim::photograph(world, samples, {&shown, 1}, seed++);
-                                      }};
-    LIMN_TRY_STATUS(calib::capture_pose(plan, static_cast<int>(pose), stage));
+    const calib::CaptureBackend backend{.show = [&](int, const cv::Mat& image) -> Status {
+                                          shown = image.clone();
+                                          return {};
+                                        },
+                                        .grab = [&](int) -> Result<cv::Mat> {
+                                          return sim::photograph(world, samples, {&shown, 1}, seed++);
+                                        }};
+    LIMN_TRY_STATUS(calib::capture_pose(plan, static_cast<int>(pose), backend));
   }
   cv::imwrite((folder / "complete.png").string(), cv::Mat::zeros(1, 1, CV_8U));
   fs::rename(folder / "complete.png", folder / "complete");

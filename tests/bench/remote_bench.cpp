@@ -46,9 +46,9 @@ double ms_since(Clock::time_point begun) {
 }
 
 // A session on the virtual studio. The virtual rig's rendering is not counted.
-class Stage {
+class ServedRoom {
  public:
-  Stage() : context_(device::GlContext::create().value()) {
+  ServedRoom() : context_(device::GlContext::create().value()) {
     sim::World world =
         sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image)
             .value();
@@ -95,9 +95,9 @@ class Stage {
 
 // Four guests who receive the state. One of them edits; with `rooms` all receive the live composite. Their
 // own work is small and has the lowest priority.
-class AuthSessions {
+class Guests {
  public:
-  AuthSessions(const remote::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
+  Guests(const remote::Server& server, bool rooms, std::vector<double>* late_ms) : late_ms_(late_ms) {
     const std::string pin = server.invitation().pins[1];
     for (int i = 0; i < k_guests; ++i) {
       const auto paired =
@@ -109,7 +109,7 @@ class AuthSessions {
     }
     for (int i = 0; i < k_guests; ++i) threads_.emplace_back([this, i] { attend(i); });
   }
-  ~AuthSessions() {
+  ~Guests() {
     is_over_ = true;
     for (std::thread& thread : threads_) thread.join();
   }
@@ -175,9 +175,9 @@ int rounds_of(int argc, char** argv) {
 
 int run(int argc, char** argv) {
   set_log_level(LogLevel::warning);
-  Stage stage;
+  ServedRoom room;
   const fs::path keys = fs::temp_directory_path() / fmt::format("limn-remote-bench-{}", ::getpid());
-  auto tablet_view = remote::TabletView::create(stage.setup(), keys);
+  auto tablet_view = remote::TabletView::create(room.setup(), keys);
   if (!tablet_view) {
     fmt::print(stderr, "{}\n", tablet_view.message());
     return 1;
@@ -191,7 +191,7 @@ int run(int argc, char** argv) {
   const auto turn = [&] {
     std::vector<double> times;
     for (int i = 0; i < k_frames; ++i) {
-      const double ms = stage.frame(server->get());
+      const double ms = room.frame(server->get());
       if (i > 0) times.push_back(ms);
     }
     return quantile(times, 0.5);
@@ -203,7 +203,7 @@ int run(int argc, char** argv) {
   const auto beside = [&](bool rooms, std::vector<double>* late, std::vector<double>* shares) {
     double with = 0;
     {
-      const AuthSessions guests(**server, rooms, late);
+      const Guests guests(**server, rooms, late);
       with = turn();
     }
     const double before = alone.back();

@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
                        }));
     if (empty > 0) return 1;
     solving = std::min(solving, seconds_of([&] {
-                         const auto report = limn::wizard::solved(options);
+                         const auto report = limn::wizard::solve_captures(options);
                          if (!report) return fmt::print(stderr, "{}\n", report.message());
                          held_out = report->assessment.held_out.rms_px;
                          worst = report->assessment.held_out.worst_px;

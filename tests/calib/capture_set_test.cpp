@@ -32,13 +32,13 @@ TEST(CaptureSet, AreReadBackAsTheyWereTaken) {
     const fs::path folder = test::test_folder() / "captures";
     const CaptureSet plan = small_plan(folder, projectors);
     ASSERT_TRUE(begin_captures(plan).ok());
-    int shown = 0, told = 0;
+    int shown = 0, reported = 0;
     CaptureBackend backend = plain_stage(&shown);
-    backend.report_progress = [&](int done, int total) { told = total - done; };
+    backend.report_progress = [&](int done, int total) { reported = total - done; };
     for (const int pose : {0, 1}) {
       const Status status = capture_pose(plan, pose, backend);
       ASSERT_TRUE(status.ok()) << status.message();
-      EXPECT_EQ(told, 0);
+      EXPECT_EQ(reported, 0);
     }
     const auto read = load_captures(folder);
     ASSERT_TRUE(read.ok()) << read.message();

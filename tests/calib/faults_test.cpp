@@ -28,57 +28,57 @@ constexpr int k_poses = 5;
 constexpr int k_shots = 38;  // images of a series on the bench: 9 + 9 bits, white and black
 
 // The report for somebody who solves the captures.
-struct Told {
+struct Diagnosis {
   Names names;
   std::string verdict;  ///< "failed" when the solve fails
   std::optional<Solution> solution;
   std::vector<Fault> faults;
 };
 
-Told told_of(const CaptureSet& captures, const std::string& injected, const Rig* earlier) {
-  Told told{{}, "failed", {}, {}};
+Diagnosis diagnosis_of(const CaptureSet& captures, const std::string& injected, const Rig* earlier) {
+  Diagnosis diagnosis{{}, "failed", {}, {}};
   const auto observed = observe(captures);
   EXPECT_TRUE(observed.ok()) << observed.message();
-  if (!observed) return told;
-  told.faults = unsolved_faults(*observed);
+  if (!observed) return diagnosis;
+  diagnosis.faults = unsolved_faults(*observed);
   if (const auto solution = solve(observed->observations)) {
-    told.faults = faults(*observed, *solution, {}, {});
+    diagnosis.faults = faults(*observed, *solution, {}, {});
     auto assessment = assess(*observed, {}, *solution);
     if (assessment) {
       if (earlier) add_faults(faults_against(*earlier, solution->rig), &*assessment);
-      told.verdict = to_text(assessment->verdict);
-      told.faults = assessment->faults;
+      diagnosis.verdict = to_text(assessment->verdict);
+      diagnosis.faults = assessment->faults;
     }
-    told.solution = *solution;
+    diagnosis.solution = *solution;
   }
   std::string names;
-  for (const Fault& fault : told.faults) {
+  for (const Fault& fault : diagnosis.faults) {
     const std::string name = to_text(fault.name);
-    if (told.names.insert(name).second) names += " " + name;
+    if (diagnosis.names.insert(name).second) names += " " + name;
     EXPECT_FALSE(fault.evidence.empty() || fault.advice.empty()) << name;
   }
   printf("[ injected ] %-34s ->%s; %s\n", injected.c_str(), names.empty() ? " nothing" : names.c_str(),
-         told.verdict.c_str());
-  return told;
+         diagnosis.verdict.c_str());
+  return diagnosis;
 }
 
-Told told_of(const FaultBench& bench, const std::string& injected, const Rig* earlier = nullptr) {
+Diagnosis diagnosis_of(const FaultBench& bench, const std::string& injected, const Rig* earlier = nullptr) {
   const auto captures = bench.capture(test_folder() / "captures");
   EXPECT_TRUE(captures.ok()) << captures.message();
-  return captures ? told_of(*captures, injected, earlier) : Told{};
+  return captures ? diagnosis_of(*captures, injected, earlier) : Diagnosis{};
 }
 
 // The fault is named, no other fault except those it implies, and the rig is not accepted.
-void expect_named(const Told& told, const std::string& name, const Names& implied = {}) {
-  EXPECT_TRUE(told.names.count(name)) << to_text(told.faults);
-  EXPECT_NE(told.verdict, "good");
-  for (const std::string& other : told.names)
-    EXPECT_TRUE(other == name || implied.count(other)) << to_text(told.faults);
+void expect_named(const Diagnosis& diagnosis, const std::string& name, const Names& implied = {}) {
+  EXPECT_TRUE(diagnosis.names.count(name)) << to_text(diagnosis.faults);
+  EXPECT_NE(diagnosis.verdict, "good");
+  for (const std::string& other : diagnosis.names)
+    EXPECT_TRUE(other == name || implied.count(other)) << to_text(diagnosis.faults);
 }
 
-void expect_sound(const Told& told) {
-  EXPECT_EQ(told.names, Names()) << to_text(told.faults);
-  EXPECT_EQ(told.verdict, "good");
+void expect_sound(const Diagnosis& diagnosis) {
+  EXPECT_EQ(diagnosis.names, Names()) << to_text(diagnosis.faults);
+  EXPECT_EQ(diagnosis.verdict, "good");
 }
 
 FaultBench bench(int poses = k_poses) { return FaultBench::create("bench", poses); }
@@ -103,10 +103,10 @@ std::function<cv::Mat(const cv::Mat&)> flipped(int how) {
   };
 }
 
-TEST(SoundCaptures, OfTheBenchHaveNoFault) { expect_sound(told_of(bench(), "nothing, bench")); }
+TEST(SoundCaptures, OfTheBenchHaveNoFault) { expect_sound(diagnosis_of(bench(), "nothing, bench")); }
 
 TEST(SoundCaptures, OfTheStudioHaveNoFault) {
-  expect_sound(told_of(FaultBench::create("studio", k_poses), "nothing, studio"));
+  expect_sound(diagnosis_of(FaultBench::create("studio", k_poses), "nothing, studio"));
 }
 
 TEST(SoundCaptures, WithOtherNoiseHaveNoFault) {
@@ -114,14 +114,14 @@ TEST(SoundCaptures, WithOtherNoiseHaveNoFault) {
   noisy.seed = 11;
   noisy.world.camera_effects[0].read_noise = 1.5;
   noisy.world.camera_effects[0].full_well_e = 4000;
-  expect_sound(told_of(noisy, "nothing, bench, twice the noise"));
+  expect_sound(diagnosis_of(noisy, "nothing, bench, twice the noise"));
 }
 
 TEST(SoundCaptures, OfOtherCodesHaveNoFault) {
   for (const PatternCode code : {PatternCode::phase, PatternCode::exclusive_or}) {
     FaultBench other = bench();
     other.code = code;
-    expect_sound(told_of(other, "nothing, bench, " + to_text(code)));
+    expect_sound(diagnosis_of(other, "nothing, bench, " + to_text(code)));
   }
 }
 
@@ -130,7 +130,7 @@ TEST(SoundCaptures, OfAProjectorWhoseGammaIsNearlyTheWavesHaveNoFault) {
   FaultBench near = bench();
   near.code = PatternCode::phase;
   near.world.projector_effects[0].gamma = 2.35;
-  expect_sound(told_of(near, "nothing, waves for gamma 2.2 at 2.35"));
+  expect_sound(diagnosis_of(near, "nothing, waves for gamma 2.2 at 2.35"));
 }
 
 TEST(SoundCaptures, PhotographedInARealRoomHaveNoFault) {
@@ -139,27 +139,28 @@ TEST(SoundCaptures, PhotographedInARealRoomHaveNoFault) {
   const auto captures = import_opencv_gray(
       {*folder, 1024, 768, Board::parse("chessboard:9x7:75mm").value(), "capture_*", "graycode_*.png", {}});
   ASSERT_TRUE(captures.ok()) << captures.message();
-  expect_sound(told_of(*captures, "nothing, real photographs", nullptr));
+  expect_sound(diagnosis_of(*captures, "nothing, real photographs", nullptr));
 }
 
 TEST(Faults, PatternsOnADisplayThatIsNotInTheRoom) {
   FaultBench dark = bench(3);
   dark.display_of = [](int) { return -1; };
-  expect_named(told_of(dark, "patterns on another display"), "wrong_display");
+  expect_named(diagnosis_of(dark, "patterns on another display"), "wrong_display");
 }
 
 TEST(Faults, BothProjectorsPatternsOnOneDisplay) {
   FaultBench same = FaultBench::create("studio", 3);
   same.display_of = [](int) { return 0; };
-  expect_named(told_of(same, "both patterns on one display"), "wrong_display", {"few_poses", "low_coverage"});
+  expect_named(diagnosis_of(same, "both patterns on one display"), "wrong_display",
+               {"few_poses", "low_coverage"});
 }
 
 TEST(Faults, ProjectorsSwappedSinceTheLastCalibration) {
   FaultBench studio = FaultBench::create("studio", 4);
-  const Told before = told_of(studio, "nothing, four poses");
+  const Diagnosis before = diagnosis_of(studio, "nothing, four poses");
   ASSERT_TRUE(before.solution.has_value());
   studio.display_of = [](int projector) { return 1 - projector; };
-  const Told after = told_of(studio, "projectors swapped", &before.solution->rig);
+  const Diagnosis after = diagnosis_of(studio, "projectors swapped", &before.solution->rig);
   expect_named(after, "projectors_swapped", {"few_poses"});
 }
 
@@ -169,13 +170,13 @@ TEST(Faults, KeystoneLeftOn) {
     return warped(image, {{{0.08F, 0}, {0.92F, 0}, {1, 1}, {0, 1}}});
   };
   // No projector has such an axis: poses contradict each other and the board seems bent.
-  expect_named(told_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "bent_board"});
+  expect_named(diagnosis_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "bent_board"});
 }
 
 TEST(Faults, DisplayNotInItsNativeResolution) {
   FaultBench scaled = bench();
   scaled.mode = cv::Size(600, 375);
-  expect_named(told_of(scaled, "scaled from 600x375 to 480x300"), "keystone_or_scaling");
+  expect_named(diagnosis_of(scaled, "scaled from 600x375 to 480x300"), "keystone_or_scaling");
 }
 
 TEST(Faults, BoardsAllButParallel) {
@@ -187,7 +188,7 @@ TEST(Faults, BoardsAllButParallel) {
                                Pose(exp_rotation({0.02 * n, 0.05 - 0.02 * n, 0}), Vector3d::Zero());
   }
   // Boards side by side also leave most of the image empty.
-  expect_named(told_of(flat, "boards almost parallel"), "little_tilt", {"low_coverage"});
+  expect_named(diagnosis_of(flat, "boards almost parallel"), "little_tilt", {"low_coverage"});
 }
 
 TEST(Faults, ExposureDriftsDown) {
@@ -195,7 +196,7 @@ TEST(Faults, ExposureDriftsDown) {
   drift.before_shot = [](int, int shot, sim::World* world) {
     world->camera_effects[0].exposure = 0.75 * (1 - 0.12 * shot / (k_shots - 1));
   };
-  expect_named(told_of(drift, "exposure drifts by 12 %"), "exposure_drift");
+  expect_named(diagnosis_of(drift, "exposure drifts by 12 %"), "exposure_drift");
 }
 
 TEST(Faults, ExposureFollowsTheLight) {
@@ -203,7 +204,7 @@ TEST(Faults, ExposureFollowsTheLight) {
   automatic.before_shot = [](int, int shot, sim::World* world) {
     world->camera_effects[0].exposure = shot == k_shots - 2 ? 0.6 : shot == k_shots - 1 ? 1.0 : 0.75;
   };
-  expect_named(told_of(automatic, "automatic exposure"), "exposure_drift");
+  expect_named(diagnosis_of(automatic, "automatic exposure"), "exposure_drift");
 }
 
 TEST(Faults, ExposureFollowsTheLightOfNarrowStripes) {
@@ -212,7 +213,7 @@ TEST(Faults, ExposureFollowsTheLightOfNarrowStripes) {
   automatic.before_shot = [](int, int shot, sim::World* world) {
     world->camera_effects[0].exposure = shot == k_shots - 2 ? 0.6 : shot == k_shots - 1 ? 1.0 : 0.75;
   };
-  expect_named(told_of(automatic, "automatic exposure, xor"), "exposure_drift");
+  expect_named(diagnosis_of(automatic, "automatic exposure, xor"), "exposure_drift");
 }
 
 TEST(Faults, ProjectorGammaNotWhatTheWavesWereDrawnFor) {
@@ -220,11 +221,11 @@ TEST(Faults, ProjectorGammaNotWhatTheWavesWereDrawnFor) {
     FaultBench other = bench();
     other.code = PatternCode::phase;
     other.world.projector_effects[0].gamma = gamma;
-    const Told told = told_of(other, fmt::format("waves for gamma 2.2 at {}", gamma));
-    expect_named(told, "projector_gamma");
+    const Diagnosis diagnosis = diagnosis_of(other, fmt::format("waves for gamma 2.2 at {}", gamma));
+    expect_named(diagnosis, "projector_gamma");
     // The waves are right when 2.2 is multiplied by the factor in the advice.
-    ASSERT_FALSE(told.faults.empty());
-    const std::string& advice = told.faults[0].advice;
+    ASSERT_FALSE(diagnosis.faults.empty());
+    const std::string& advice = diagnosis.faults[0].advice;
     const size_t at = advice.find("gamma by ");
     ASSERT_NE(at, std::string::npos) << advice;
     EXPECT_NEAR(std::stod(advice.substr(at + 9)), gamma / 2.2, 0.02);
@@ -234,7 +235,7 @@ TEST(Faults, ProjectorGammaNotWhatTheWavesWereDrawnFor) {
 TEST(Faults, WhiteDrivesTheCameraToFullScale) {
   FaultBench bright = bench();
   bright.world.camera_effects[0].exposure *= 2.2;
-  expect_named(told_of(bright, "exposure 2.2 times too long"), "saturated");
+  expect_named(diagnosis_of(bright, "exposure 2.2 times too long"), "saturated");
 }
 
 // The display was late: the camera saw the previous image.
@@ -248,56 +249,56 @@ TEST(Faults, OneImageIsTheOneBefore) {
     if (!repeated) last = photo.clone();
     return last.clone();
   };
-  const Told told = told_of(late, "one picture repeated");
-  expect_named(told, "repeated_pictures", {"low_decode"});  // in that pose a wide stripe is missing
-  EXPECT_NE(to_text(told.faults).find("pose02, camera0 of projector0: 009.png"), std::string::npos)
-      << to_text(told.faults);
+  const Diagnosis diagnosis = diagnosis_of(late, "one picture repeated");
+  expect_named(diagnosis, "repeated_pictures", {"low_decode"});  // in that pose a wide stripe is missing
+  EXPECT_NE(to_text(diagnosis.faults).find("pose02, camera0 of projector0: 009.png"), std::string::npos)
+      << to_text(diagnosis.faults);
 }
 
 TEST(Faults, BoardMovedDuringACapture) {
   FaultBench moved = bench();
   moved.nudge = Nudge{2, 20, false, Pose(Eigen::Quaterniond::Identity(), {0.002, 0, 0.001})};
-  const Told told = told_of(moved, "board moved by 2.2 mm");
-  expect_named(told, "moved_during_capture", {"odd_pose"});
-  EXPECT_NE(to_text(told.faults).find("pose02"), std::string::npos);
+  const Diagnosis diagnosis = diagnosis_of(moved, "board moved by 2.2 mm");
+  expect_named(diagnosis, "moved_during_capture", {"odd_pose"});
+  EXPECT_NE(to_text(diagnosis.faults).find("pose02"), std::string::npos);
 }
 
 TEST(Faults, CameraMovedDuringACapture) {
   FaultBench moved = bench();
   moved.nudge = Nudge{3, 12, true, Pose(exp_rotation({0, 0, 0.004}), Vector3d::Zero())};
-  expect_named(told_of(moved, "camera turned by 0.23 degrees"), "moved_during_capture", {"odd_pose"});
+  expect_named(diagnosis_of(moved, "camera turned by 0.23 degrees"), "moved_during_capture", {"odd_pose"});
 }
 
 TEST(Faults, ProjectorOutOfFocus) {
   FaultBench blurred = bench();
   blurred.world.projector_effects[0].focus_m = 0.7;
   blurred.world.projector_effects[0].aperture_m = 0.025;
-  expect_named(told_of(blurred, "projector out of focus"), "defocus");
+  expect_named(diagnosis_of(blurred, "projector out of focus"), "defocus");
 }
 
 TEST(Faults, CameraOutOfFocus) {
   FaultBench blurred = bench();
   blurred.world.camera_effects[0].psf_px = 1.8;
-  expect_named(told_of(blurred, "camera out of focus"), "defocus");
+  expect_named(diagnosis_of(blurred, "camera out of focus"), "defocus");
 }
 
 TEST(Faults, CameraOutOfFocusForNarrowStripes) {
   FaultBench blurred = bench();
   blurred.code = PatternCode::exclusive_or;
   blurred.world.camera_effects[0].psf_px = 1.8;
-  expect_named(told_of(blurred, "camera out of focus, xor"), "defocus");
+  expect_named(diagnosis_of(blurred, "camera out of focus, xor"), "defocus");
 }
 
 TEST(Faults, ProjectionMirrored) {
   FaultBench mirrored = bench(3);
   mirrored.on_panel = flipped(1);
-  expect_named(told_of(mirrored, "mirrored"), "mirrored_projection");
+  expect_named(diagnosis_of(mirrored, "mirrored"), "mirrored_projection");
 }
 
 TEST(Faults, ProjectionTurnedUpsideDown) {
   FaultBench rotated = bench();
   rotated.on_panel = flipped(-1);
-  expect_named(told_of(rotated, "turned by 180 degrees"), "rotated_projection");
+  expect_named(diagnosis_of(rotated, "turned by 180 degrees"), "rotated_projection");
 }
 
 TEST(Faults, CameraImageStretched) {
@@ -307,7 +308,8 @@ TEST(Faults, CameraImageStretched) {
     cv::resize(photo.rowRange(24, photo.rows - 24), whole, photo.size(), 0, 0, cv::INTER_LINEAR);
     return whole;
   };
-  expect_named(told_of(stretched, "camera's picture stretched"), "wrong_camera_resolution", {"odd_pose"});
+  expect_named(diagnosis_of(stretched, "camera's picture stretched"), "wrong_camera_resolution",
+               {"odd_pose"});
 }
 
 TEST(Faults, CameraImageOfAnotherSizeNamesTheFile) {
@@ -329,20 +331,20 @@ TEST(Faults, RoomTooBright) {
   bright.world.room.ambient *= 12;
   for (sim::Lamp& lamp : bright.world.room.lamps) lamp.illuminance_at_1m *= 12;
   bright.world.camera_effects[0].exposure *= 0.25;
-  expect_named(told_of(bright, "room 12 times as bright"), "ambient_light");
+  expect_named(diagnosis_of(bright, "room 12 times as bright"), "ambient_light");
 }
 
 TEST(Faults, ProjectorHardlyMeetsWhatTheCameraSees) {
   FaultBench aside = bench();
   Pose& projector = aside.world.rig.projectors[0].imager_from_world;
   projector = Pose(exp_rotation({0, 0.5, 0}), Vector3d::Zero()) * projector;
-  expect_named(told_of(aside, "projector turned aside"), "little_overlap", {"low_coverage"});
+  expect_named(diagnosis_of(aside, "projector turned aside"), "little_overlap", {"low_coverage"});
 }
 
 TEST(Faults, BoardBent) {
   FaultBench bent = bench();
   bent.sheet = [](const Vector2d& p) { return Vector3d(p.x(), p.y(), 0.004 * (1 - p.x() * p.x() / 0.04)); };
-  expect_named(told_of(bent, "board bent by 4 mm"), "bent_board");
+  expect_named(diagnosis_of(bent, "board bent by 4 mm"), "bent_board");
 }
 
 TEST(Faults, BoardTwisted) {
@@ -350,21 +352,21 @@ TEST(Faults, BoardTwisted) {
   twisted.sheet = [](const Vector2d& p) {
     return Vector3d(p.x(), p.y(), 0.004 * p.x() * p.y() / 0.2 / 0.13);
   };
-  expect_named(told_of(twisted, "board twisted by 4 mm"), "bent_board", {"odd_pose"});
+  expect_named(diagnosis_of(twisted, "board twisted by 4 mm"), "bent_board", {"odd_pose"});
 }
 
 TEST(Faults, SquaresWiderThanHigh) {
   FaultBench stretched = bench();
   stretched.sheet = [](const Vector2d& p) { return Vector3d(1.02 * p.x(), p.y(), 0); };
-  expect_named(told_of(stretched, "squares 2 % too wide"), "wrong_square_size", {"odd_pose"});
+  expect_named(diagnosis_of(stretched, "squares 2 % too wide"), "wrong_square_size", {"odd_pose"});
 }
 
 TEST(Faults, SquaresLargerThanInTheLastCalibration) {
   FaultBench larger = bench(4);
-  const Told before = told_of(larger, "nothing, four poses");
+  const Diagnosis before = diagnosis_of(larger, "nothing, four poses");
   ASSERT_TRUE(before.solution.has_value());
   larger.sheet = [](const Vector2d& p) { return Vector3d(1.03 * p.x(), 1.03 * p.y(), 0); };
-  expect_named(told_of(larger, "squares 3 % too large", &before.solution->rig), "wrong_square_size",
+  expect_named(diagnosis_of(larger, "squares 3 % too large", &before.solution->rig), "wrong_square_size",
                {"few_poses"});
 }
 

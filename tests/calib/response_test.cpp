@@ -86,7 +86,7 @@ double worst_error(const CameraResponse& response, const sim::CameraEffects& tru
 }
 
 // RMS, levels, of the predicted photograph of a colour minus the photograph without noise, where light falls.
-double foretold_error(const MeasuredResponse& measured, sim::World world, const cv::Vec3b& bgr) {
+double prediction_error(const MeasuredResponse& measured, sim::World world, const cv::Vec3b& bgr) {
   sim::CameraEffects& effects = world.camera_effects[0];
   effects.full_well_e = effects.read_noise = 0;
   const sim::Samples samples = sim::trace(world, 0);
@@ -97,15 +97,15 @@ double foretold_error(const MeasuredResponse& measured, sim::World world, const 
   };
   const cv::Mat black = taken({0, 0, 0}), white = taken({255, 255, 255}),
                 photo = taken({bgr[0] * 1.0, bgr[1] * 1.0, bgr[2] * 1.0});
-  const cv::Mat foretold = predicted_photograph(measured.mixings.at(0), measured.responses.projectors.at(0),
-                                                measured.responses.cameras.at(0), bgr)
-                               .reshape(1);
+  const cv::Mat predicted = predicted_photograph(measured.mixings.at(0), measured.responses.projectors.at(0),
+                                                 measured.responses.cameras.at(0), bgr)
+                                .reshape(1);
   double squares = 0;
   int count = 0;
   for (int r = 0; r < photo.rows; ++r)
     for (int c = 0; c < photo.cols; ++c)
       if (white.at<uchar>(r, c) - black.at<uchar>(r, c) >= 10 && photo.at<uchar>(r, c) < k_clipped) {
-        squares += std::pow(foretold.at<float>(r, c) - photo.at<uchar>(r, c), 2);
+        squares += std::pow(predicted.at<float>(r, c) - photo.at<uchar>(r, c), 2);
         ++count;
       }
   EXPECT_GT(count, photo.rows * photo.cols / 5);
@@ -149,7 +149,7 @@ TEST_P(ResponseOf, ProjectorAndCameraIsFoundAndForetellsOtherColours) {
   for (int k = 0; k < 3; ++k) {
     const cv::Vec3b bgr(static_cast<uchar>(rng() % 256), static_cast<uchar>(rng() % 256),
                         static_cast<uchar>(rng() % 256));
-    worst = std::max(worst, foretold_error(*measured, world, bgr));
+    worst = std::max(worst, prediction_error(*measured, world, bgr));
   }
   EXPECT_LT(worst, 2);
   EXPECT_LT(measured->mixings.at(0).held_out_levels, 3) << "includes the photographs' own noise";

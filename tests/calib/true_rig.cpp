@@ -118,7 +118,7 @@ scene::Mesh panel_mesh() {
 
 // ---- judging ----
 
-struct ReferenceRenderer {
+struct SurfacePoint {
   Vector3d p, n;  // on the prototype, its frame
 };
 
@@ -196,14 +196,14 @@ std::vector<double> errors_at(const TrueRig& truth,
   const sim::RayScene scene({&there, 1});
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
   std::vector<Vector3d> visible;
-  std::vector<ReferenceRenderer> aims;
+  std::vector<SurfacePoint> targets;
   for (const sim::SampledPoint& point : sim::surface_points(mesh, 8 * count, (*rng)())) {
     const Vector3d p_world = world_from_prototype * point.p,
                    n_world = world_from_prototype.rotation * point.n;
     if (seen(scene, camera, p_world) && faces(camera, p_world, n_world)) visible.push_back(point.p);
-    if (static_cast<int>(aims.size()) < count && seen(scene, projector, p_world) &&
+    if (static_cast<int>(targets.size()) < count && seen(scene, projector, p_world) &&
         faces(projector, p_world, n_world))
-      aims.push_back({point.p, point.n});
+      targets.push_back({point.p, point.n});
   }
   if (visible.size() < 4 * k_measured) return {};
   const std::vector<Vector3d> known = spread(visible, k_measured);
@@ -213,11 +213,11 @@ std::vector<double> errors_at(const TrueRig& truth,
     pixels.push_back(*camera.project(world_from_prototype * p) + Vector2d(noise(*rng), noise(*rng)));
   const Pose measured = measured_pose(calibrated.cameras[0], known, pixels);
   std::vector<double> errors;
-  for (const ReferenceRenderer& reference : aims) {
-    const auto px = calibrated.projectors[0].project(measured * reference.p);
+  for (const SurfacePoint& target : targets) {
+    const auto px = calibrated.projectors[0].project(measured * target.p);
     if (!px) continue;
-    const auto error = error_mm(scene, projector, *px, world_from_prototype * reference.p,
-                                world_from_prototype.rotation * reference.n);
+    const auto error = error_mm(scene, projector, *px, world_from_prototype * target.p,
+                                world_from_prototype.rotation * target.n);
     if (error) errors.push_back(*error);
   }
   return errors;

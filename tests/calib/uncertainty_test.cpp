@@ -101,12 +101,12 @@ TEST(Propagate, DrawnRigsMissByWhatTheCovarianceSays) {
     for (const double e : landed(truth, rig, mesh, k_pnp_px, 120, &rng).pooled_mm()) errors.push_back(e);
   }
   const auto observations = observed_perfectly(truth, 8);
-  const double foretold =
+  const double predicted =
       calib::propagated_error_mm(observations, solution, {solution.covariance, k_pnp_px})[0];
-  printf("[ propagate] predicted p95 %.3f mm, drawn %.3f mm\n", foretold, p95(errors));
+  printf("[ propagate] predicted p95 %.3f mm, drawn %.3f mm\n", predicted, p95(errors));
   // 40 draws of about 8 free directions: one standard deviation of their 95 % is about 10 %; and the
   // prototype differs from the target that the propagation assumes.
-  EXPECT_NEAR(p95(errors) / foretold, 1.0, 0.35);
+  EXPECT_NEAR(p95(errors) / predicted, 1.0, 0.35);
 }
 
 TEST(Propagate, TheStatedErrorHoldsForNinetyToNinetyEightPercentOfUnseenPoints) {

@@ -55,9 +55,9 @@ TEST(Rig, SavedRigLoadsTheSame) {
 
 TEST(Rig, AProjectorsFocusMayBeTold) {
   const auto folder = test::test_folder();
-  Rig told = two_devices();
-  told.focuses = {{"projector0", 1.25, 0.02}};
-  ASSERT_TRUE(save_rig(told, folder));
+  Rig saved = two_devices();
+  saved.focuses = {{"projector0", 1.25, 0.02}};
+  ASSERT_TRUE(save_rig(saved, folder));
   const auto rig = load_rig(folder);
   ASSERT_TRUE(rig) << rig.message();
   ASSERT_EQ(rig->focuses.size(), 1u);

@@ -1,4 +1,6 @@
 // Runs a fuzz target on its seeds and on some thousand mutations of them, the same ones every time.
+#include "tests/fuzz/regression.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -16,7 +18,7 @@ namespace fs = std::filesystem;
 
 std::vector<std::string> seeds() {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(LIMN_FUZZ_CORPUS)) files.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(test::k_fuzz_corpus)) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   std::vector<std::string> contents;
   for (const fs::path& file : files) contents.push_back(read_file(file).value());
@@ -90,7 +92,7 @@ TEST(Fuzz, SeedsAndMutationsOfThemAreReadOrRefused) {
   ASSERT_FALSE(all.empty());
   for (const std::string& seed : all) feed(seed);
   Mutator mutator(all);
-  for (int i = 0; i < LIMN_FUZZ_RUNS && !HasFailure(); ++i) feed(mutator.mutated());
+  for (int i = 0; i < test::k_fuzz_runs && !HasFailure(); ++i) feed(mutator.mutated());
 }
 
 }  // namespace

@@ -438,15 +438,15 @@ TEST(House, IdentifiersKeepToTheGlossary) {
       std::ifstream in(file);
       std::string code = code_alone({std::istreambuf_iterator<char>(in), {}});
       code = std::regex_replace(code, preprocessor, "");
-      Names told;
+      Names reported;
       for (std::sregex_iterator at(code.begin(), code.end(), identifier), end; at != end; ++at) {
         ++seen;
         const std::string name = at->str();
-        if (told.contains(name)) continue;
+        if (reported.contains(name)) continue;
         const std::string words = as_words(name);
         for (const std::string& word : forbidden) {
           if (words.find("_" + word + "_") == std::string::npos) continue;
-          told.insert(name);
+          reported.insert(name);
           ADD_FAILURE() << fs::relative(file, root()) << ": " << name << " (docs/glossary.md: do not use "
                         << word << ")";
         }

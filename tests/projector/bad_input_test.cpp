@@ -78,9 +78,9 @@ TEST_F(BadInput, ATextureBeyondTheLimitIsNamedAndShownReduced) {
   material.texture_file = "skins/stripes.png";
   testing::internal::CaptureStderr();
   Renderer drawing = renderer(scene, one_projector());
-  const std::string told = testing::internal::GetCapturedStderr();
+  const std::string messages = testing::internal::GetCapturedStderr();
   for (const char* word : {"skins/stripes.png", "4096 x 4096", "6000 x 16", "reduced to 4096 x 16"})
-    EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+    EXPECT_NE(messages.find(word), std::string::npos) << word << " in: " << messages;
   const cv::Mat seen =
       drawing.composite(0, cv::Mat::zeros(240, 320, CV_8UC3), posed_at_origin(), Composite::full);
   const auto at = [&](double x) {
@@ -102,10 +102,10 @@ TEST_F(BadInput, MapsBeyondTheLimitAreNamedAndReduced) {
   scene::add_tangents(&mesh);
   testing::internal::CaptureStderr();
   Renderer drawing = renderer(scene, one_projector());
-  const std::string told = testing::internal::GetCapturedStderr();
+  const std::string messages = testing::internal::GetCapturedStderr();
   for (const char* word :
        {"skins/bumps.png", "5000 x 8", "skins/rough.png", "8 x 5001", "skins/folds.png", "5002 x 8"})
-    EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+    EXPECT_NE(messages.find(word), std::string::npos) << word << " in: " << messages;
   const cv::Mat seen =
       drawing.composite(0, cv::Mat::zeros(240, 320, CV_8UC3), posed_at_origin(), Composite::full);
   EXPECT_GT(brightest(seen), 50);
@@ -116,9 +116,9 @@ TEST_F(BadInput, AnAlbedoBeyondTheLimitIsNamedAndReduced) {
   scene.prototype->albedo_image = cv::Mat(8, 5000, CV_8UC3, cv::Scalar(200, 200, 200));
   testing::internal::CaptureStderr();
   Renderer drawing = renderer(scene, one_projector());
-  const std::string told = testing::internal::GetCapturedStderr();
+  const std::string messages = testing::internal::GetCapturedStderr();
   for (const char* word : {"albedo", "4096 x 4096", "5000 x 8"})
-    EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+    EXPECT_NE(messages.find(word), std::string::npos) << word << " in: " << messages;
 }
 
 TEST_F(BadInput, MoreTrianglesThanTheDriverHoldsAreRefused) {

@@ -335,7 +335,7 @@ Judged painted_over_print(const Pose& new_from_old) {
     return cv::Mat(sim::ideal_light(world, samples, images));
   };
   // Each channel is scaled for the best fit, because the camera's white is not under test.
-  const auto judged = [&](const cv::Mat& light, const cv::Mat& where, double* similarity) {
+  const auto judge = [&](const cv::Mat& light, const cv::Mat& where, double* similarity) {
     std::vector<cv::Mat> seen, ideal;
     cv::split(light, seen);
     cv::split(wanted, ideal);
@@ -354,8 +354,8 @@ Judged painted_over_print(const Pose& new_from_old) {
   const cv::Mat without = shone({}, &everywhere);
   Judged judged_as{};
   double ignored = 0;
-  judged_as.psnr_db = judged(with, in_gamut, &judged_as.ssim);
-  judged_as.psnr_without_db = judged(without, in_gamut, &ignored);
+  judged_as.psnr_db = judge(with, in_gamut, &judged_as.ssim);
+  judged_as.psnr_without_db = judge(without, in_gamut, &ignored);
   judged_as.in_gamut_share = 1.0 * cv::countNonZero(in_gamut) / cv::countNonZero(on_prototype);
   fmt::print(
       "{:.3f} of the prototype in gamut: {:.1f} dB, SSIM {:.3f}; without {:.1f} dB; {} captures a "

@@ -148,28 +148,28 @@ TEST_F(AServedSession, ProgramsEditOverHttp) {
 
 // In the words of the actions, so that everybody's sliders stand there; also those of a look.
 TEST_F(AServedSession, TellsMaterialsAndLight) {
-  using RendererInput = std::pair<std::string, std::string>;  // the mirror's material, the light
+  using MaterialAndLight = std::pair<std::string, std::string>;  // the mirror's material, the light
   std::string token;
   const auto done = [&](const char* action, const char* slot, const std::string& value) {
     const auto answer = client()->post(
         "/api/edit", json({{"action", action}, {"slot", slot}, {"value", value}}).dump(), token);
     EXPECT_EQ(answer.status, 200) << answer.body;
     const json state = json::parse(client()->get("/api/state", token).body);
-    return RendererInput(state["slots"][0]["material"], state["light"]);
+    return MaterialAndLight(state["slots"][0]["material"], state["light"]);
   };
   play_while([&] {
     token = token_of(Role::work, "Ann");
-    EXPECT_EQ(done("grid", "", "on"), RendererInput("", ""));
-    EXPECT_EQ(done("material", "mirror", "#c02818 - 0.45"), RendererInput("#c02818 - 0.45", ""));
-    EXPECT_EQ(done("material", "mirror", ""), RendererInput("", ""));
+    EXPECT_EQ(done("grid", "", "on"), MaterialAndLight("", ""));
+    EXPECT_EQ(done("material", "mirror", "#c02818 - 0.45"), MaterialAndLight("#c02818 - 0.45", ""));
+    EXPECT_EQ(done("material", "mirror", ""), MaterialAndLight("", ""));
     for (const char* light : {"-135 -20.5 0.65 0.35 0.15", "30 45 0.6 0.3 0.1", "170 5 2 0 0"})
-      EXPECT_EQ(done("light", "", light), RendererInput("", light));
+      EXPECT_EQ(done("light", "", light), MaterialAndLight("", light));
   });
   session_->compose_and_record(at_, at_);  // which looks are saved of
   ASSERT_TRUE(session_->edit({"save_look", "", "dark"}, "test", at_));
   play_while([&] {
-    EXPECT_EQ(done("light", "", ""), RendererInput("", ""));
-    EXPECT_EQ(done("restore_look", "", "dark"), RendererInput("", "170 5 2 0 0"));
+    EXPECT_EQ(done("light", "", ""), MaterialAndLight("", ""));
+    EXPECT_EQ(done("restore_look", "", "dark"), MaterialAndLight("", "170 5 2 0 0"));
   });
 }
 
@@ -354,10 +354,10 @@ TEST_F(AServedSession, ProjectsACodeForAWhile) {
     EXPECT_EQ(client()->get("/picture/room.jpg", works).status, 200);
     const auto projector = client()->get("/picture/projector/projector0.jpg", looks);
     ASSERT_EQ(projector.status, 200);
-    const cv::Mat told = device::decode_jpeg({reinterpret_cast<const std::uint8_t*>(projector.body.data()),
+    const cv::Mat sent = device::decode_jpeg({reinterpret_cast<const std::uint8_t*>(projector.body.data()),
                                               projector.body.size()})
                              .value();
-    EXPECT_LT(cv::norm(told, painted, cv::NORM_L1) / static_cast<double>(told.total()), 3) << "of 255 levels";
+    EXPECT_LT(cv::norm(sent, painted, cv::NORM_L1) / static_cast<double>(sent.total()), 3) << "of 255 levels";
     for (const auto& [token, bytes] : {std::pair{looks, 0}, {works, 3}}) {
       const auto socket = client();
       ASSERT_EQ(socket->upgrade(token).status, 101);

@@ -239,11 +239,11 @@ TEST(Mesh, TheBaseColoursAlphaMultipliesTheTextures) {
   EXPECT_NEAR(loaded("0.8").cut_below, 0.625, 1e-6);  // relative to the texture's own alpha
   testing::internal::CaptureStderr();
   const Material faint = loaded("0.25");
-  const std::string told = testing::internal::GetCapturedStderr();
+  const std::string messages = testing::internal::GetCapturedStderr();
   EXPECT_EQ(faint.cut_below, 0);
   EXPECT_EQ(faint.texture.type(), CV_8UC3);
   for (const char* word : {"part.gltf", "alpha of 0.5", "opaque"})
-    EXPECT_NE(told.find(word), std::string::npos) << told;
+    EXPECT_NE(messages.find(word), std::string::npos) << messages;
 }
 
 // textured_gltf with additions to its material, these images as textures 1 to 4, and a normal at each corner.
@@ -293,30 +293,31 @@ TEST(Mesh, SurfaceMapsOfGltfAreRead) {
 TEST(Mesh, MapsThatCannotBeReadAreToldAndLeftOut) {
   written("gone/paint.png", small_png());
   written("gone/torn.png", small_png().substr(0, 40));
-  const auto loaded = [&](const std::string& maps, const std::string& file, std::string* told) {
+  const auto loaded = [&](const std::string& maps, const std::string& file, std::string* messages) {
     const auto path = written("gone/part.gltf", gltf_with_maps(R"("name":"chrome",)" + maps, {file}));
     testing::internal::CaptureStderr();
     const auto mesh = load_mesh(path, LengthUnit::metre);
-    *told = testing::internal::GetCapturedStderr();
+    *messages = testing::internal::GetCapturedStderr();
     EXPECT_TRUE(mesh) << mesh.message();
     return mesh->materials[mesh->triangle_materials[0]];
   };
-  std::string told;
-  const auto expect_told = [&](std::initializer_list<const char*> words) {
-    for (const char* word : words) EXPECT_NE(told.find(word), std::string::npos) << word << " in: " << told;
+  std::string messages;
+  const auto expect_messages = [&](std::initializer_list<const char*> words) {
+    for (const char* word : words)
+      EXPECT_NE(messages.find(word), std::string::npos) << word << " in: " << messages;
   };
-  EXPECT_TRUE(loaded(R"("normalTexture":{"index":1},)", "gone.png", &told).maps.is_none());
-  expect_told({"gone/part.gltf", "'chrome'", "normal texture", "gone.png", "shown smooth"});
-  EXPECT_TRUE(loaded(R"("occlusionTexture":{"index":1},)", "torn.png", &told).maps.is_none());
-  expect_told({"gone/part.gltf", "'chrome'", "occlusion texture", "torn.png", "soft light everywhere"});
+  EXPECT_TRUE(loaded(R"("normalTexture":{"index":1},)", "gone.png", &messages).maps.is_none());
+  expect_messages({"gone/part.gltf", "'chrome'", "normal texture", "gone.png", "shown smooth"});
+  EXPECT_TRUE(loaded(R"("occlusionTexture":{"index":1},)", "torn.png", &messages).maps.is_none());
+  expect_messages({"gone/part.gltf", "'chrome'", "occlusion texture", "torn.png", "soft light everywhere"});
   // Without its texture an emissive material must not be white everywhere.
-  EXPECT_TRUE(loaded(R"("emissiveFactor":[1,1,1],"emissiveTexture":{"index":1},)", "gone.png", &told)
+  EXPECT_TRUE(loaded(R"("emissiveFactor":[1,1,1],"emissiveTexture":{"index":1},)", "gone.png", &messages)
                   .emitted.isZero());
-  expect_told({"'chrome'", "emissive texture", "without light of its own"});
-  EXPECT_FALSE(loaded(R"("emissiveFactor":[1,1,1],)", "paint.png", &told).emitted.isZero());
-  EXPECT_EQ(told, "");
-  loaded(R"("normalTexture":{"index":1,"texCoord":1},)", "paint.png", &told);
-  expect_told({"'chrome'", "normal texture", "coordinates 1"});
+  expect_messages({"'chrome'", "emissive texture", "without light of its own"});
+  EXPECT_FALSE(loaded(R"("emissiveFactor":[1,1,1],)", "paint.png", &messages).emitted.isZero());
+  EXPECT_EQ(messages, "");
+  loaded(R"("normalTexture":{"index":1,"texCoord":1},)", "paint.png", &messages);
+  expect_messages({"'chrome'", "normal texture", "coordinates 1"});
 }
 
 // textured_gltf with this mapping of its base colour texture. Its second texture coordinates are the
@@ -391,7 +392,7 @@ TEST(Mesh, TexturesLieInTheCoordinatesThatTheMaterialNames) {
 
 TEST(Mesh, ATextureInAnotherPlaceThanTheFirstIsTold) {
   written("apart/paint.png", small_png());
-  const auto told = [&](const std::string& base, const std::string& normal) {
+  const auto messages = [&](const std::string& base, const std::string& normal) {
     testing::internal::CaptureStderr();
     const auto mesh = load_mesh(
         written("apart/part.gltf",
@@ -401,12 +402,12 @@ TEST(Mesh, ATextureInAnotherPlaceThanTheFirstIsTold) {
     return testing::internal::GetCapturedStderr();
   };
   const std::string twice = moved(R"("scale":[2,2])");
-  EXPECT_EQ(told(twice, twice), "");
-  EXPECT_EQ(told(R"("texCoord":1)", R"("texCoord":1)"), "");
-  const std::string unmoved = told(twice, R"("texCoord":0)");
+  EXPECT_EQ(messages(twice, twice), "");
+  EXPECT_EQ(messages(R"("texCoord":1)", R"("texCoord":1)"), "");
+  const std::string unmoved = messages(twice, R"("texCoord":0)");
   for (const char* word : {"apart/part.gltf", "'chrome'", "normal texture", "KHR_texture_transform"})
     EXPECT_NE(unmoved.find(word), std::string::npos) << word << " in: " << unmoved;
-  const std::string second = told(R"("texCoord":0)", R"("texCoord":1)");
+  const std::string second = messages(R"("texCoord":0)", R"("texCoord":1)");
   for (const char* word : {"'chrome'", "normal texture", "found coordinates 1"})
     EXPECT_NE(second.find(word), std::string::npos) << word << " in: " << second;
 }

@@ -26,15 +26,15 @@ TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
       const test::SmallDisk full(7);  // bytes: half a line more
       add("22\n");
       EXPECT_EQ(read_file(path).value(), "row\n1\n") << "a line is whole or not there";
-      const auto news = file->news();
-      ASSERT_TRUE(news);
-      EXPECT_NE(news->find("rows.csv: expected to write here"), std::string::npos) << *news;
+      const auto message = file->take_message();
+      ASSERT_TRUE(message);
+      EXPECT_NE(message->find("rows.csv: expected to write here"), std::string::npos) << *message;
       add("333\n");
-      EXPECT_FALSE(file->news()) << "each message comes once";
+      EXPECT_FALSE(file->take_message()) << "each message comes once";
     }
     add("4\n");
     EXPECT_EQ(read_file(path).value(), all);
-    EXPECT_EQ(file->news(), "rows.csv can be written again.");
+    EXPECT_EQ(file->take_message(), "rows.csv can be written again.");
     add("5\n");
     file->add("6\n", shifted(Stamp{}, at_s + 0.1));
     all += "6\n";

@@ -29,13 +29,13 @@ using nlohmann::json;
 
 constexpr double k_nudged_s = 3.5, k_hands_s = 3;
 
-struct RendererInput {
+struct ReportedDrift {
   double at_s = 0;
   Drift drift;
 };
 
 // The drifts that a session in the studio reports during these events.
-std::vector<RendererInput> found(const json& events, double seconds) {
+std::vector<ReportedDrift> found(const json& events, double seconds) {
   const fs::path file = test::test_folder() / "script.json";
   const json script = {{"schema", "limn.script/1"}, {"seconds", seconds}, {"events", events}};
   test::write_json(file, script);
@@ -48,7 +48,7 @@ std::vector<RendererInput> found(const json& events, double seconds) {
   Perception perception = Perception::create(setup.scene, setup.rig).value();
   FrameComposer composer = FrameComposer::create(setup.scene, setup.rig).value();
   const scene::ShowState show_state = scene::initial_show_state(setup.scene);
-  std::vector<RendererInput> out;
+  std::vector<ReportedDrift> out;
   std::optional<Drift> before;
   while (rig.next_exposure() < shifted(Stamp{}, seconds)) {
     room.set(seconds_between(Stamp{}, rig.next_exposure()));
@@ -84,26 +84,26 @@ json sway(const std::string& marker, const Eigen::Vector3d& amplitude_m, double 
 }
 
 // Hands are held into the light and a part is moved to and fro; then a device is nudged.
-std::vector<RendererInput> found_after_hands(const json& nudge, double seconds) {
+std::vector<ReportedDrift> found_after_hands(const json& nudge, double seconds) {
   return found({hand("block", "projector0", 0.5, k_hands_s), hand("cover", "aruco_4x4_50:1", 1, k_hands_s),
                 sway("aruco_4x4_50:0", {0.02, 0, 0}, 1, 2.5), nudge},
                seconds);
 }
 
-void expect_named(const std::vector<RendererInput>& told, const std::string& device) {
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_GT(told[0].at_s, k_nudged_s);
-  EXPECT_LE(told[0].at_s, k_nudged_s + 10);
-  EXPECT_EQ(told[0].drift.devices, std::vector{device});
+void expect_named(const std::vector<ReportedDrift>& reported, const std::string& device) {
+  ASSERT_EQ(reported.size(), 1u);
+  EXPECT_GT(reported[0].at_s, k_nudged_s);
+  EXPECT_LE(reported[0].at_s, k_nudged_s + 10);
+  EXPECT_EQ(reported[0].drift.devices, std::vector{device});
 }
 
 TEST(Drift, AProjectorIsNamedUntilItStandsRightAgain) {
   json event = nudge("projector0", {0, 0.25, 0});
   event["until_s"] = 8;
-  const auto told = found_after_hands(event, 16);
-  ASSERT_EQ(told.size(), 2u);
-  expect_named({told[0]}, "projector0");
-  EXPECT_GT(told[1].at_s, 8);
+  const auto reported = found_after_hands(event, 16);
+  ASSERT_EQ(reported.size(), 2u);
+  expect_named({reported[0]}, "projector0");
+  EXPECT_GT(reported[1].at_s, 8);
 }
 
 // This projector's light has hardly any edge across its direction of motion.
@@ -136,10 +136,10 @@ TEST(Drift, HandsAreNone) {
   }
   const double nudged_s = seconds + 4;
   events.push_back(nudge("projector0", {0, 0.25, 0}, nudged_s));
-  const auto told = found(events, nudged_s + 10);
-  ASSERT_EQ(told.size(), 1u);
-  EXPECT_GT(told[0].at_s, nudged_s);
-  const std::vector<std::string>& devices = told[0].drift.devices;
+  const auto reported = found(events, nudged_s + 10);
+  ASSERT_EQ(reported.size(), 1u);
+  EXPECT_GT(reported[0].at_s, nudged_s);
+  const std::vector<std::string>& devices = reported[0].drift.devices;
   EXPECT_NE(std::find(devices.begin(), devices.end(), "projector0"), devices.end());
 }
 

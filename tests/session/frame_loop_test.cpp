@@ -30,7 +30,7 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
   bool is_over() const override { return steps == 0; }
   Result<Perceived> perceive() override {
     --steps;
-    said += "perceive ";
+    calls += "perceive ";
     const int camera = 0;
     Perceived out;
     out.percepts = perception_->watch(rig_->expose(std::span(&camera, 1)));
@@ -38,35 +38,35 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
     return out;
   }
   Status edit(Session* session) override {
-    said += "edit ";
+    calls += "edit ";
     EXPECT_EQ(session->percepts().captured_at, perception_->percepts().captured_at)
         << "perceive() comes before edit()";
     return session->edit({"grid", "", "toggle"}, "test", now());
   }
   Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) override {
-    said += "show ";
+    calls += "show ";
     EXPECT_EQ(painted.painted_at, now());
     covered = cv::norm(light[0], painted.projectors[0], cv::NORM_INF) > 0;
     same = cv::norm(light[1], painted.projectors[1], cv::NORM_INF) == 0;
     return {};
   }
   void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
-    said += images.empty() ? "no-screens " : "screens ";
+    calls += images.empty() ? "no-screens " : "screens ";
   }
-  void apply_edits(const SessionMoment&) override { said += "hear "; }
+  void apply_edits(const SessionMoment&) override { calls += "client-edits "; }
   void publish_state(const SessionMoment& moment) override {
-    said += moment.shown ? "tell-shown " : "tell ";
+    calls += moment.shown ? "publish-shown " : "publish ";
     if (moment.shown) {
       EXPECT_EQ(moment.shown->shown_at, shifted(now(), 0.04));
     }
   }
   std::vector<Overlay> overlays(Session*) override {
-    said += "overlay ";
+    calls += "overlay ";
     return {SignOverlay{0, cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(255)), std::nullopt}};
   }
   bool ends_session() const override { return ends; }
 
-  std::string said;
+  std::string calls;
   int steps = 0;
   bool shows = true, ends = false, covered = false, same = false;
 
@@ -90,7 +90,7 @@ class AFrameLoop : public testing::Test {
   }
   Status played(int steps) {
     notes_->steps = steps;
-    notes_->said.clear();
+    notes_->calls.clear();
     FrameLoop loop({*perception_, *session_, *output_, {&*notes_}}, {*notes_, *notes_, *notes_, health_});
     return loop.run(is_ended_);
   }
@@ -108,7 +108,7 @@ class AFrameLoop : public testing::Test {
 
 TEST_F(AFrameLoop, GoesInOneOrder) {
   ASSERT_TRUE(played(1));
-  EXPECT_EQ(notes_->said, "perceive edit hear overlay show no-screens tell-shown ");
+  EXPECT_EQ(notes_->calls, "perceive edit client-edits overlay show no-screens publish-shown ");
   EXPECT_TRUE(session_->show_state().grid) << "an edit counts in the same frame";
 }
 
@@ -121,7 +121,7 @@ TEST_F(AFrameLoop, OverlaysAreInTheLightAndNotInWhatWasPainted) {
 TEST_F(AFrameLoop, TakesInWhatChangesWhenNoImageIsDue) {
   notes_->shows = false;
   ASSERT_TRUE(played(2));
-  EXPECT_EQ(notes_->said, "perceive edit hear perceive edit hear ");
+  EXPECT_EQ(notes_->calls, "perceive edit client-edits perceive edit client-edits ");
   EXPECT_EQ(session_->composed().painted_at, Stamp{});
 }
 

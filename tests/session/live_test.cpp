@@ -156,23 +156,23 @@ TEST(Live, GoesOnWithAMendedRig) {
 // Edits of another program come at any moment; they are recorded and replayed at the same moment.
 TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   const fs::path folder = test::test_folder();
-  auto told = UdpSocket::hearing({"127.0.0.1", "0"});
-  ASSERT_TRUE(told) << told.message();
+  auto answers = UdpSocket::receiving({"127.0.0.1", "0"});
+  ASSERT_TRUE(answers) << answers.message();
   copy_studio_to(folder);
   apps::LiveOptions options;
   options.resolution = 0.5;
   options.world = folder / "world.json";
   options.seconds = 1e5;  // ended below
   options.osc = "127.0.0.1:47312";
-  options.osc_to = fmt::format("127.0.0.1:{}", told->port());
+  options.osc_to = fmt::format("127.0.0.1:{}", answers->port());
   options.record = folder / "recording";
   options.out = folder / "out";
-  bool was_told = false;
+  bool was_answered = false;
   std::thread other([&] {
-    auto mouth = UdpSocket::sending({"127.0.0.1", "47312"});
-    const auto has_told = [&](const std::string& wanted) {
+    auto sender = UdpSocket::sending({"127.0.0.1", "47312"});
+    const auto has_answered = [&](const std::string& wanted) {
       std::array<std::uint8_t, 2048> bytes{};
-      while (const auto length = told->next(bytes))
+      while (const auto length = answers->next(bytes))
         if (std::string(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*length)).find(wanted) !=
             std::string::npos)
           return true;
@@ -182,23 +182,23 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
     const auto say = [&](const std::string& path, const std::vector<OscValue>& values,
                          const std::string& answer) {
       for (int i = 0; i < 600; ++i) {
-        mouth->send(osc_message(path, values));
+        sender->send(osc_message(path, values));
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        if (has_told(answer)) return true;
+        if (has_answered(answer)) return true;
       }
       return false;
     };
-    was_told = say("/limn/choose_variant", {"mirror", "sport"}, "sport") &&
-               say("/limn/save_look", {"heard"}, "heard");
-    mouth->send(osc_message("/limn/restore_look", {"heard"}));
-    mouth->send(osc_message("/limn/restore_look", {"never"}));
-    was_told = was_told && say("/limn/save_look", {"last"}, "last");
+    was_answered = say("/limn/choose_variant", {"mirror", "sport"}, "sport") &&
+                   say("/limn/save_look", {"heard"}, "heard");
+    sender->send(osc_message("/limn/restore_look", {"heard"}));
+    sender->send(osc_message("/limn/restore_look", {"never"}));
+    was_answered = was_answered && say("/limn/save_look", {"last"}, "last");
     std::raise(SIGTERM);
   });
   const Status lived = apps::run_live(options);
   other.join();
   ASSERT_TRUE(lived.ok()) << lived.message();
-  EXPECT_TRUE(was_told);
+  EXPECT_TRUE(was_answered);
   const std::string page = read_file(folder / "out/session.html").value();
   EXPECT_NE(page.find("choose_variant mirror sport (osc)"), std::string::npos);
   EXPECT_NE(page.find("restore_look heard (osc)"), std::string::npos);
@@ -370,10 +370,10 @@ TEST(Live, GoesOnWhenItsCamerasImagesAndClockChange) {
                               {{"at_s", 0.6}, {"clock_step", "camera0"}, {"seconds", -9000}}});
   EXPECT_TRUE(test::image_near(last_light("stepped"), last_light("calm"), 0, 0, "light"));
   EXPECT_EQ(stepped.at("missed_frames"), 0);
-  int told = 0;
+  int steps = 0;
   for (const json& note : stepped.at("notes"))
-    told += note.at("what").get<std::string>().find("camera0's clock has stepped") == 0;
-  EXPECT_EQ(told, 2);
+    steps += note.at("what").get<std::string>().find("camera0's clock has stepped") == 0;
+  EXPECT_EQ(steps, 2);
 
   const json resized =
       lived("resized", 1.6, {{{"at_s", 0.3}, {"until_s", 1.3}, {"resize", "camera0"}, {"size", {640, 480}}}});
@@ -477,10 +477,10 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   const fs::path dropped = folder / "door/slots/mirror/new.glb";
 
   SceneWatch watch(folder / "door");
-  const auto news = [&] {
+  const auto changed_scene = [&] {
     const auto begun = std::chrono::steady_clock::now();
     for (;;) {
-      auto scene = watch.news();
+      auto scene = watch.take_changed_scene();
       const double waited_s = seconds_between(begun, std::chrono::steady_clock::now());
       if (!scene && waited_s < 20) continue;
       std::printf("after %.0f ms\n", 1e3 * waited_s);
@@ -488,11 +488,11 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
     }
   };
   fs::copy_file(folder / "door/mirror-sport.glb", dropped);
-  const auto there = news();
+  const auto there = changed_scene();
   ASSERT_TRUE(there.has_value() && *there);
   EXPECT_EQ((*there)->scene.find_slot("mirror")->variants.back().name, "new");
   fs::resize_file(dropped, 1000);
-  const auto broken = news();
+  const auto broken = changed_scene();
   ASSERT_TRUE(broken.has_value());
   ASSERT_TRUE(*broken);
   ASSERT_EQ((*broken)->skipped_variants.size(), 1u);

@@ -61,12 +61,12 @@ TEST(Osc, TheTableTheDocumentationAndTheActionsAgree) {
       ++wanted;
     }
   };
-  check(osc_heard());
-  check(osc_told());
+  check(osc_received());
+  check(osc_sent());
   EXPECT_EQ(rows.size(), wanted) << "docs/osc.md has an address that does not exist";
-  ASSERT_EQ(osc_heard().size(), scene::actions().size());
-  for (std::size_t i = 0; i < osc_heard().size(); ++i)
-    EXPECT_EQ(osc_heard()[i].path, fmt::format("/limn/{}", scene::actions()[i].name));
+  ASSERT_EQ(osc_received().size(), scene::actions().size());
+  for (std::size_t i = 0; i < osc_received().size(); ++i)
+    EXPECT_EQ(osc_received()[i].path, fmt::format("/limn/{}", scene::actions()[i].name));
 }
 
 // A minimal message for each action, with the arguments that the action takes, gives an edit of that action.
@@ -225,7 +225,7 @@ class AnOscSession : public testing::Test {
 TEST_F(AnOscSession, HearsAnotherPrograms) {
   auto port = OscPort::open("0", "");
   ASSERT_TRUE(port) << port.message();
-  const auto hear = [&] {
+  const auto receive = [&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     port->apply_edits(&*session_, &*telemetry_, Stamp{});
   };
@@ -236,7 +236,7 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", variants[1].name.c_str()), 0);
   ASSERT_GT(lo_send(to, "/limn/blackout", "T"), 0);
   ASSERT_GT(lo_send(to, "/limn/nudge", "sfid", "mirror", 1.0, 2, -3.5), 0);
-  hear();
+  receive();
   EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
   EXPECT_TRUE(session_->show_state().blackout);
   EXPECT_TRUE(
@@ -244,7 +244,7 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
 
   // A pose, in the form in which the session sends poses; the part is then there.
   ASSERT_GT(lo_send(to, "/limn/place", "sfffffff", "mirror", 20.0, -30.0, 12.5, 1.2, 0.0, 1.2, 0.0), 0);
-  hear();
+  receive();
   const auto& pin = session_->show_state().slots[0].pin;
   ASSERT_TRUE(pin.has_value());
   EXPECT_TRUE(test::pose_near(
@@ -256,14 +256,14 @@ TEST_F(AnOscSession, HearsAnotherPrograms) {
   // The content of one screen, and of all.
   ASSERT_GT(lo_send(to, "/limn/screen", "s", "camera"), 0);
   ASSERT_GT(lo_send(to, "/limn/screen", "ss", "full", "wall"), 0);
-  hear();
+  receive();
   EXPECT_EQ(session_->show_state().screen, scene::Screen::camera);
   EXPECT_EQ(scene::screen_content(session_->show_state(), "wall"), scene::Screen::full);
   EXPECT_EQ(scene::screen_content(session_->show_state(), "desk"), scene::Screen::camera);
 
   // A variant that the scene does not have changes nothing and is reported.
   ASSERT_GT(lo_send(to, "/limn/choose_variant", "ss", "mirror", "no such"), 0);
-  hear();
+  receive();
   EXPECT_EQ(session_->show_state().slots[0].variant, variants[1].name);
   EXPECT_NE(page().find("OSC refused: choose_variant: expected a variant"), std::string::npos) << page();
   lo_address_free(to);
@@ -296,40 +296,40 @@ TEST_F(AnOscSession, AFloodIsTakenInPortionsAndToldOnce) {
   lo_address_free(to);
 }
 
-struct RendererInput {
+struct ReceivedMessages {
   std::vector<std::string> lines;
 };
 
-int note_told(const char* path, const char* types, lo_arg** values, int count, lo_message, void* into) {
+int note_received(const char* path, const char* types, lo_arg** values, int count, lo_message, void* into) {
   std::string line = path;
   for (int i = 0; i < count; ++i)
     line += types[i] == 's'   ? fmt::format(" {}", &values[i]->s)
             : types[i] == 'i' ? fmt::format(" {}", values[i]->i)
                               : fmt::format(" {:.2f}", values[i]->f);
-  static_cast<RendererInput*>(into)->lines.push_back(line);
+  static_cast<ReceivedMessages*>(into)->lines.push_back(line);
   return 0;
 }
 
 TEST_F(AnOscSession, TellsWhatChanges) {
-  const lo_server ear = lo_server_new(nullptr, nullptr);
-  ASSERT_NE(ear, nullptr);
-  RendererInput told;
-  lo_server_add_method(ear, nullptr, nullptr, note_told, &told);
-  auto port = OscPort::open("", fmt::format("127.0.0.1:{}", lo_server_get_port(ear)));
+  const lo_server server = lo_server_new(nullptr, nullptr);
+  ASSERT_NE(server, nullptr);
+  ReceivedMessages received;
+  lo_server_add_method(server, nullptr, nullptr, note_received, &received);
+  auto port = OscPort::open("", fmt::format("127.0.0.1:{}", lo_server_get_port(server)));
   ASSERT_TRUE(port) << port.message();
-  const auto heard = [&](Stamp at = Stamp{}) {
-    told.lines.clear();
+  const auto received_lines = [&](Stamp at = Stamp{}) {
+    received.lines.clear();
     port->publish_state(*session_, at);
-    while (lo_server_recv_noblock(ear, 20) > 0) {
+    while (lo_server_recv_noblock(server, 20) > 0) {
     }
-    return told.lines;
+    return received.lines;
   };
   const auto has = [](const std::vector<std::string>& lines, const std::string& line) {
     return std::find(lines.begin(), lines.end(), line) != lines.end();
   };
   const std::string variant = session_->setup().scene.slots[0].variants[0].name;
-  const auto all = heard();
-  for (const OscAddress& address : osc_told()) {
+  const auto all = received_lines();
+  for (const OscAddress& address : osc_sent()) {
     if (address.path == "/limn/state/pose" || address.path == "/limn/state/prototype")
       continue;  // no marker is seen
     EXPECT_TRUE(std::any_of(all.begin(), all.end(), [&](const std::string& line) {
@@ -339,16 +339,16 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   EXPECT_TRUE(has(all, "/limn/state/variant mirror " + variant));
   EXPECT_TRUE(has(all, "/limn/state/lost mirror"));
   EXPECT_TRUE(has(all, "/limn/state/looks 0 0 "));
-  EXPECT_TRUE(heard().empty());
+  EXPECT_TRUE(received_lines().empty());
   ASSERT_TRUE(session_->edit({"freeze", "", "on"}, "test", Stamp{}).ok());
   ASSERT_TRUE(session_->edit({"save_look", "", "calm"}, "test", Stamp{}).ok());
-  const auto changed = heard();
+  const auto changed = received_lines();
   EXPECT_EQ(changed.size(), 3u);
   EXPECT_TRUE(has(changed, "/limn/state/freeze 1"));
   EXPECT_TRUE(has(changed, "/limn/state/look calm"));
   EXPECT_TRUE(has(changed, "/limn/state/looks 0 1 calm"));
   ASSERT_TRUE(session_->edit({"freeze", "", "off"}, "test", Stamp{}).ok());
-  heard();
+  received_lines();
 
   // After a frame in which everything is seen, the poses are sent.
   sim::World world = test::studio_world(0.5);
@@ -359,7 +359,7 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   const int camera = 0;
   session_->update_percepts(perception->watch(virtual_rig.expose(std::span(&camera, 1))), 1);
   session_->compose_and_record(virtual_rig.now(), virtual_rig.now());
-  const auto poses = heard();
+  const auto poses = received_lines();
   const scene::PosedScene& posed = session_->composed().posed;
   ASSERT_TRUE(posed.world_from_prototype.has_value());
   ASSERT_FALSE(posed.parts.empty());
@@ -370,16 +370,16 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   EXPECT_TRUE(std::any_of(poses.begin(), poses.end(), [&](const std::string& line) {
     return line.rfind(begin, 0) == 0;
   })) << begin;
-  EXPECT_TRUE(heard().empty());
-  EXPECT_TRUE(heard(shifted(Stamp{}, 0.9)).empty());
+  EXPECT_TRUE(received_lines().empty());
+  EXPECT_TRUE(received_lines(shifted(Stamp{}, 0.9)).empty());
   // Everything is sent again, for programs that started later.
-  EXPECT_GT(heard(shifted(Stamp{}, 1)).size(), all.size());
-  lo_server_free(ear);
+  EXPECT_GT(received_lines(shifted(Stamp{}, 1)).size(), all.size());
+  lo_server_free(server);
 }
 
 TEST(OscPort, SaysWhatIsWrongWithAPlace) {
-  const auto message = [](const std::string& hear, const std::string& tell) {
-    const auto port = OscPort::open(hear, tell);
+  const auto message = [](const std::string& receive_at, const std::string& send_to) {
+    const auto port = OscPort::open(receive_at, send_to);
     return port ? std::string("no error") : port.message();
   };
   EXPECT_EQ(message("", ""), "no error");

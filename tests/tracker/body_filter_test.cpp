@@ -92,8 +92,8 @@ TEST(Minima, AreTheSameFromWhereverTheyAreLookedFor) {
     }
     std::reverse(near.begin(), near.end());
     second += alone.size() == 2;
-    for (const std::vector<Pose>& foretold : {near, std::vector{near.back()}, far}) {
-      const std::vector<PoseFit> found = minima(seen, foretold);
+    for (const std::vector<Pose>& predictions : {near, std::vector{near.back()}, far}) {
+      const std::vector<PoseFit> found = minima(seen, predictions);
       ASSERT_EQ(found.size(), alone.size()) << i;
       for (std::size_t k = 0; k < found.size(); ++k) {
         const Vector6d off = boxminus(found[k].world_from_body, alone[k].world_from_body);

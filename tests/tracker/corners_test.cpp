@@ -184,13 +184,13 @@ TEST(Detector, HasNoBiasInImagesOfAnSrgbCameraWhenToldSo) {
   sweep.image.blur_px = 0.7;
   sweep.image.noise_levels = 1;
   sweep.srgb_image = true;
-  const SweepResult untold = swept(sweep, 40);
+  const SweepResult uncorrected = swept(sweep, 40);
   sweep.encoding = Encoding::srgb;
-  const SweepResult told = swept(sweep, 40);
-  EXPECT_EQ(told.found, told.markers);
-  EXPECT_LT(std::abs(told.outward), 0.012);
-  EXPECT_GT(untold.outward, -0.04);  // .06 without the correction by the cells' edges (edge_bleed.h)
-  EXPECT_LT(untold.outward, -0.012);
+  const SweepResult corrected = swept(sweep, 40);
+  EXPECT_EQ(corrected.found, corrected.markers);
+  EXPECT_LT(std::abs(corrected.outward), 0.012);
+  EXPECT_GT(uncorrected.outward, -0.04);  // .06 without the correction by the cells' edges (edge_bleed.h)
+  EXPECT_LT(uncorrected.outward, -0.012);
 }
 
 TEST(Detector, FindsSmallMarkers) {

@@ -154,7 +154,7 @@ class CheckJudge : public testing::Test {
   }
   // The values by measure.
   static std::map<std::string, CheckReading> readings(const Check& check) {
-    auto result = judged(check);
+    auto result = judge_check(check);
     if (!result) throw std::runtime_error(result.message());
     std::map<std::string, CheckReading> by_name;
     for (const CheckReading& reading : result->readings) by_name.emplace(reading.limit.measure.name, reading);
@@ -166,7 +166,7 @@ class CheckJudge : public testing::Test {
       EXPECT_TRUE(reading.good()) << name << " " << reading.value;
     for (const auto& [name, reading] : readings(wrong)) {
       EXPECT_FALSE(reading.good()) << name << " " << reading.value;
-      EXPECT_GT(reading.strain(), 1) << name;
+      EXPECT_GT(reading.limit_share(), 1) << name;
     }
   }
   static std::unique_ptr<device::GlContext> context;
@@ -284,7 +284,7 @@ TEST_F(CheckJudge, ABlackThatNobodyMeasuredShowsAtTheSeams) {
   }
   EXPECT_LT(readings(good).at("black_step_share").value, 0.2) << "half the resolution: pixels twice as wide";
   EXPECT_GT(readings(wrong).at("black_step_share").value, 0.8);
-  const auto one = judged(measured("bench"));
+  const auto one = judge_check(measured("bench"));
   ASSERT_FALSE(one) << "a projector alone has no seam but at its own light's end";
   EXPECT_NE(one.message().find("a seam of projectors"), std::string::npos) << one.message();
 }

@@ -78,15 +78,16 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
   DeviceBackend device_backend(room.devices(), room.plan.board, nullptr);
   ImageWriter writer;
   const WizardOptions options{.out = folder / "rig"};
-  const calib::CaptureSet captures = planned(room.plan, room.rig, options.out / "captures").value();
+  const calib::CaptureSet captures =
+      plan_virtual_captures(room.plan, room.rig, options.out / "captures").value();
   const auto places =
       pose_instructions(room.rig.world().rig.cameras[0], room.plan.board, room.plan.world_from_board);
   std::string lines;
   std::optional<Rig> last;  // solved from the poses so far
-  const auto done = calibrated(
+  const auto done = calibrate_rig(
       options, "{\"schema\": \"limn.captured_plan/1\"}", captures, places, device_backend.backend(&writer),
       {.say = [&](const std::string& line) { lines += line + "\n"; },
-       .aims = [&](int pose) { room.go(room.plan.world_from_board[static_cast<std::size_t>(pose)]); },
+       .pose_begins = [&](int pose) { room.go(room.plan.world_from_board[static_cast<std::size_t>(pose)]); },
        .judged =
            [&](const PoseJudged& judged, const auto&, const auto&) {
              EXPECT_EQ(judged.rig.has_value(), judged.assessment.has_value());
@@ -106,11 +107,11 @@ TEST(DeviceBackend, CapturesWhenTheBoardIsHeldStillAndWaitsForItsDisplays) {
       calib::plan_captures(folder / "again", captures.cameras, captures.projectors, captures.board,
                            calib::PatternCode::gray, {.inverses = false});
   const Stamp before = room.rig.now();
-  const Status taken = captured_once(again, rig, device_backend.backend(&writer));
+  const Status taken = capture_once(again, rig, device_backend.backend(&writer));
   ASSERT_TRUE(taken) << taken.message();
   EXPECT_LT(seconds_between(before, room.rig.now()), 15);
   const auto checked =
-      apps::rechecked({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
+      apps::recheck({.rig = options.out, .captures = again.folder, .out = folder / "checked"});
   ASSERT_TRUE(checked) << checked.message();
   EXPECT_EQ(checked->result.verdict, calib::RigVerdict::sound);
 }

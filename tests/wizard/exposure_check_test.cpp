@@ -26,13 +26,13 @@ struct Bench {
     plan = load_plan(test::small_plan(folder)).value();
     rig = std::make_unique<sim::VirtualRig>(sim::load_world(plan.world, tracker::marker_image).value(),
                                             options);
-    captures = planned(plan, *rig, folder / "captures").value();
+    captures = plan_virtual_captures(plan, *rig, folder / "captures").value();
     rig->remove_prototype();
     rig->place(board_object(plan.board, plan.world_from_board[0]));
   }
 
   ExposureReading seen() {
-    const auto all = measured_exposure(captures, capture_backend(rig.get(), nullptr, nullptr));
+    const auto all = measure_exposure(captures, capture_backend(rig.get(), nullptr, nullptr));
     EXPECT_TRUE(all.ok()) << (all ? "" : all.message());
     return all->at(0);
   }
@@ -111,7 +111,7 @@ TEST(DisplayLatency, IsMeasuredFarBelowTheFramePeriod) {
        .grab_waits_for_light = false}};
   for (const sim::VirtualRigOptions& options : all) {
     Bench bench(options);
-    const auto latency = measured_latency(flashes(bench.rig.get()));
+    const auto latency = measure_latency(flashes(bench.rig.get()));
     ASSERT_TRUE(latency) << latency.message();
     EXPECT_NEAR(latency->seconds, options.display_delay_s, 0.001);
     EXPECT_LT(latency->within_s, 0.002);
@@ -123,7 +123,7 @@ TEST(DisplayLatency, IsMeasuredFarBelowTheFramePeriod) {
 TEST(DisplayLatency, SaysWhenNothingFlashes) {
   Bench bench({.grab_waits_for_light = false});
   bench.rig->edit().projector_effects[0].illuminance_at_1m = 0;
-  const auto latency = measured_latency(flashes(bench.rig.get()));
+  const auto latency = measure_latency(flashes(bench.rig.get()));
   ASSERT_FALSE(latency);
   EXPECT_NE(latency.message().find("expected to see the display flash"), std::string::npos);
 }

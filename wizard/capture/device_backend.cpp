@@ -165,8 +165,8 @@ Status DeviceBackend::show_all(const std::vector<cv::Mat>& images) {
   return {};
 }
 
-Result<DeviceBackend::Devices> opened_devices(const device::Devices& named,
-                                              const Result<device::Desktop>& desktop) {
+Result<DeviceBackend::Devices> open_devices(const device::Devices& named,
+                                            const Result<device::Desktop>& desktop) {
   DeviceBackend::Devices open{
       .cameras = {},
       .projectors = {},

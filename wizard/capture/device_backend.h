@@ -54,8 +54,8 @@ class DeviceBackend {
 
 /// Opens the cameras and projectors of a devices file. Error: one does not work, or there is not at
 /// least one of each.
-Result<DeviceBackend::Devices> opened_devices(const device::Devices& named,
-                                              const Result<device::Desktop>& desktop);
+Result<DeviceBackend::Devices> open_devices(const device::Devices& named,
+                                            const Result<device::Desktop>& desktop);
 
 /// The devices' names and sizes, as captures list them.
 template <typename AllDevices>

@@ -21,7 +21,7 @@ struct Levels {
 };
 
 // Changes the light and returns the last frame after `seconds`. Also measures the frame period.
-Result<Frame> settled(const FlashDevices& devices, bool white, double seconds, double* period_s) {
+Result<Frame> wait_until_settled(const FlashDevices& devices, bool white, double seconds, double* period_s) {
   LIMN_TRY(const Stamp shown_at, devices.show(white));
   LIMN_TRY(Frame frame, devices.next());
   while (seconds_between(shown_at, frame.captured_at) < seconds) {
@@ -34,8 +34,8 @@ Result<Frame> settled(const FlashDevices& devices, bool white, double seconds, d
 
 Result<Levels> levels_of(const FlashDevices& devices, double limit_s) {
   Levels levels;
-  LIMN_TRY(const Frame dark, settled(devices, false, limit_s, &levels.period_s));
-  LIMN_TRY(const Frame bright, settled(devices, true, limit_s, &levels.period_s));
+  LIMN_TRY(const Frame dark, wait_until_settled(devices, false, limit_s, &levels.period_s));
+  LIMN_TRY(const Frame bright, wait_until_settled(devices, true, limit_s, &levels.period_s));
   const cv::Mat black = to_grey(dark.image), white = to_grey(bright.image);
   cv::Mat difference;
   cv::subtract(white, black, difference);
@@ -90,7 +90,7 @@ DisplayLatency most_agreed(const std::vector<Span>& spans) {
 
 }  // namespace
 
-Result<DisplayLatency> measured_latency(const FlashDevices& devices, const FlashOptions& options) {
+Result<DisplayLatency> measure_latency(const FlashDevices& devices, const FlashOptions& options) {
   LIMN_CHECK(options.flashes > 0 && options.limit_s > 0);
   LIMN_TRY(const Levels levels, levels_of(devices, options.limit_s));
   std::vector<Span> spans;

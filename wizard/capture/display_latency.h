@@ -32,6 +32,6 @@ struct DisplayLatency {
 /// them allow is returned. A frame counts as bright from half brightness on: then the light has appeared at
 /// the middle of its exposure, which is its stamp. Error: the camera does not see the light, or fewer than
 /// half of the flashes agree.
-Result<DisplayLatency> measured_latency(const FlashDevices& devices, const FlashOptions& options = {});
+Result<DisplayLatency> measure_latency(const FlashDevices& devices, const FlashOptions& options = {});
 
 }  // namespace limn::wizard

@@ -102,8 +102,8 @@ cv::Mat squares(int width, int height) {
   return image;
 }
 
-Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures,
-                                                       const calib::CaptureBackend& capture) {
+Result<std::vector<ExposureReading>> measure_exposure(const calib::CaptureSet& captures,
+                                                      const calib::CaptureBackend& capture) {
   std::vector<ExposureReading> all;
   const auto grabbed = [&](int projector, const cv::Mat& image) -> Result<std::vector<cv::Mat>> {
     LIMN_TRY_STATUS(capture.show(projector, image));

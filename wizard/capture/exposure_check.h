@@ -32,8 +32,8 @@ cv::Mat squares(int width, int height);
 
 /// Each projector in turn shows its number and colour (for people), then black, white and squares. Returns
 /// how every camera sees it, projector by projector. Error: a device fails.
-Result<std::vector<ExposureReading>> measured_exposure(const calib::CaptureSet& captures,
-                                                       const calib::CaptureBackend& capture);
+Result<std::vector<ExposureReading>> measure_exposure(const calib::CaptureSet& captures,
+                                                      const calib::CaptureBackend& capture);
 
 /// One sentence for each projector that no camera sees; empty: all are seen.
 std::vector<std::string> unseen(const std::vector<ExposureReading>& seen);

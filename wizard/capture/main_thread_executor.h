@@ -12,26 +12,26 @@ namespace limn::wizard {
 class MainThreadExecutor {
  public:
   /// Called by the other thread. Returns when the main thread has run the function.
-  void run(const std::function<void()>& errand) {
+  void run(const std::function<void()>& task) {
     std::unique_lock lock(mutex_);
-    errand_ = &errand;
+    task_ = &task;
     wanted_.notify_one();
-    done_.wait(lock, [this] { return errand_ == nullptr; });
+    done_.wait(lock, [this] { return task_ == nullptr; });
   }
 
   /// Called by the main thread. Runs the function that waits or arrives within `wait`, if there is one.
   void serve(std::chrono::nanoseconds wait = {}) {
     std::unique_lock lock(mutex_);
-    if (!wanted_.wait_for(lock, wait, [this] { return errand_ != nullptr; })) return;
-    (*errand_)();
-    errand_ = nullptr;
+    if (!wanted_.wait_for(lock, wait, [this] { return task_ != nullptr; })) return;
+    (*task_)();
+    task_ = nullptr;
     done_.notify_one();
   }
 
  private:
   std::mutex mutex_;
   std::condition_variable wanted_, done_;
-  const std::function<void()>* errand_ = nullptr;
+  const std::function<void()>* task_ = nullptr;
 };
 
 }  // namespace limn::wizard

@@ -122,8 +122,8 @@ int shown_images(const calib::CaptureSet& captures) {
 Result<calib::Board> calibration_board(const Rig& rig) {
   const Json provenance = provenance_of(rig);
   const auto text = provenance.find("board");
-  const bool is_told = text != provenance.end() && text->is_string();
-  return calib::Board::parse(is_told ? text->get<std::string>() : k_any_board);
+  const bool is_stated = text != provenance.end() && text->is_string();
+  return calib::Board::parse(is_stated ? text->get<std::string>() : k_any_board);
 }
 
 std::string recheck_sentence(const calib::RigCheck& result) {
@@ -166,7 +166,7 @@ Result<CheckedRig> recheck_rig(const Rig& rig,
   return checked;
 }
 
-Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const WizardBackend& backend) {
+Status capture_once(const calib::CaptureSet& captures, const Rig& rig, const WizardBackend& backend) {
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   const Json latencies_ms = provenance_of(rig).value("display_latency_ms", Json::object());
   for (std::size_t i = 0; i < captures.projectors.size(); ++i)
@@ -187,10 +187,10 @@ int recheck_images(const Rig& rig) {
   return images;
 }
 
-Result<Rechecked> rechecked_in_place(const Rig& rig,
-                                     const WizardBackend& backend,
-                                     const fs::path& folder,
-                                     const std::function<bool()>& should_continue) {
+Result<Rechecked> recheck_in_place(const Rig& rig,
+                                   const WizardBackend& backend,
+                                   const fs::path& folder,
+                                   const std::function<bool()>& should_continue) {
   LIMN_TRY(const calib::Board board, calibration_board(rig));
   const auto devices = [](const std::vector<Imager>& imagers) {
     std::vector<calib::CapturedDevice> list;
@@ -198,9 +198,9 @@ Result<Rechecked> rechecked_in_place(const Rig& rig,
     return list;
   };
   const fs::path captures = folder / "captures";
-  LIMN_TRY_STATUS(captured_once(calib::plan_captures(captures, devices(rig.cameras), devices(rig.projectors),
-                                                     board, k_code_in_place, k_sparse),
-                                rig, backend));
+  LIMN_TRY_STATUS(capture_once(calib::plan_captures(captures, devices(rig.cameras), devices(rig.projectors),
+                                                    board, k_code_in_place, k_sparse),
+                               rig, backend));
   LIMN_TRY(CheckedRig checked, recheck_rig(rig, captures, {}, folder, should_continue));
   LIMN_TRY_STATUS(check_explained(checked.rechecked.result));
   LIMN_TRY_STATUS(save_rig(checked.rechecked.result.rig, folder));

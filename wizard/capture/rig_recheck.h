@@ -44,19 +44,19 @@ Result<calib::Board> calibration_board(const Rig& rig);
 
 /// Captures one pose of whatever stands in front of the devices of `backend` into the captures' folder, with
 /// the display latencies in the rig's provenance.
-Status captured_once(const calib::CaptureSet& captures, const Rig& rig, const WizardBackend& backend);
+Status capture_once(const calib::CaptureSet& captures, const Rig& rig, const WizardBackend& backend);
 
 /// Captures the prototype once as it stands and checks the rig with it. The devices of `backend` are already
-/// open and have the rig's names and order; only stage, written and use_latency are needed. The result's rig
-/// is the corrected one; it, recheck.json and captures/ are written to `folder`. Error, and no rig is
-/// written: no move of a single device explains the observations, or `should_continue`, which is called from
-/// time to time, returns false.
-Result<Rechecked> rechecked_in_place(const Rig& rig,
-                                     const WizardBackend& backend,
-                                     const std::filesystem::path& folder,
-                                     const std::function<bool()>& should_continue = {});
+/// open and have the rig's names and order; only capture, wait_for_files and use_latency are needed. The
+/// result's rig is the corrected one; it, recheck.json and captures/ are written to `folder`. Error, and no
+/// rig is written: no move of a single device explains the observations, or `should_continue`, which is
+/// called from time to time, returns false.
+Result<Rechecked> recheck_in_place(const Rig& rig,
+                                   const WizardBackend& backend,
+                                   const std::filesystem::path& folder,
+                                   const std::function<bool()>& should_continue = {});
 
-/// The number of images that rechecked_in_place() shows.
+/// The number of images that recheck_in_place() shows.
 int recheck_images(const Rig& rig);
 
 }  // namespace limn::wizard

@@ -38,9 +38,9 @@ Status capture_poses(const calib::CaptureSet& captures,
 
 }  // namespace
 
-Result<calib::CaptureSet> planned(const Plan& plan,
-                                  const sim::VirtualRig& rig,
-                                  const std::filesystem::path& out) {
+Result<calib::CaptureSet> plan_virtual_captures(const Plan& plan,
+                                                const sim::VirtualRig& rig,
+                                                const std::filesystem::path& out) {
   calib::CaptureSet captures =
       calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
                            plan.board, plan.code, plan.code_options);
@@ -69,7 +69,7 @@ calib::CaptureBackend capture_backend(sim::VirtualRig* rig,
           .report_progress = std::move(report_progress)};
 }
 
-Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig) {
+Status capture_response_images(const calib::CaptureSet& captures, sim::VirtualRig* rig) {
   ImageWriter writer;
   std::optional<Progress> progress;
   const calib::CaptureBackend capture = capture_backend(rig, &writer, [&](int done, int total) {
@@ -92,7 +92,7 @@ sim::Object board_object(const calib::Board& board, const Pose& world_from_board
 }
 
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out) {
-  LIMN_TRY(const calib::CaptureSet captures, planned(plan, *rig, out));
+  LIMN_TRY(const calib::CaptureSet captures, plan_virtual_captures(plan, *rig, out));
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   rig->remove_prototype();
   const auto hold_board = [&](int pose) {
@@ -102,14 +102,14 @@ Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::file
       capture_poses(captures, static_cast<int>(plan.world_from_board.size()), hold_board, rig);
   rig->remove("board");
   rig->restore_prototype();
-  return done && plan.response ? capture_lit(captures, rig) : done;
+  return done && plan.response ? capture_response_images(captures, rig) : done;
 }
 
 Status capture_prototype(const Plan& plan,
                          const std::vector<Pose>& world_from_prototype,
                          sim::VirtualRig* rig,
                          const std::filesystem::path& out) {
-  LIMN_TRY(const calib::CaptureSet captures, planned(plan, *rig, out));
+  LIMN_TRY(const calib::CaptureSet captures, plan_virtual_captures(plan, *rig, out));
   LIMN_TRY_STATUS(calib::begin_captures(captures));
   const Pose home = rig->world().world_from_prototype;
   const auto stand = [&](int pose) {

@@ -16,9 +16,9 @@ namespace limn::wizard {
 sim::Object board_object(const calib::Board& board, const Pose& world_from_board);
 
 /// The capture set of a plan for this rig, still without poses.
-Result<calib::CaptureSet> planned(const Plan& plan,
-                                  const sim::VirtualRig& rig,
-                                  const std::filesystem::path& out);
+Result<calib::CaptureSet> plan_virtual_captures(const Plan& plan,
+                                                const sim::VirtualRig& rig,
+                                                const std::filesystem::path& out);
 
 /// The rig's devices as a capture backend; images go to `writer`.
 calib::CaptureBackend capture_backend(sim::VirtualRig* rig,
@@ -26,7 +26,7 @@ calib::CaptureBackend capture_backend(sim::VirtualRig* rig,
                                       calib::ReportProgress report_progress);
 
 /// Captures the response images of whatever stands in front of the rig.
-Status capture_lit(const calib::CaptureSet& captures, sim::VirtualRig* rig);
+Status capture_response_images(const calib::CaptureSet& captures, sim::VirtualRig* rig);
 
 /// Captures every pose of the plan with the board in a virtual rig; the prototype is removed meanwhile.
 Status capture_virtually(const Plan& plan, sim::VirtualRig* rig, const std::filesystem::path& out);

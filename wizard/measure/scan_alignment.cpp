@@ -31,7 +31,7 @@ constexpr int k_image_width = 1200, k_image_height = 800;
 constexpr double k_residual_reach_m = 0.02;  // points further from the mesh belong to another object
 constexpr double k_colour_limit_mm = 2;      // end of the residual map's colour scale
 constexpr double k_symmetric = 0.9;  // share of the best pose's points; a warning if a rival pose fits more
-constexpr std::size_t k_told = 12;   // number of differences printed; all are in align.json
+constexpr std::size_t k_most_printed = 12;  // number of differences printed; all are in align.json
 
 // A pose and how it was found.
 struct Start {
@@ -134,7 +134,7 @@ bool starts_from_markers(const AlignOptions& command) {
   return !command.scene.empty() && !is_mesh_alone;
 }
 
-Status checked(const AlignOptions& command) {
+Status check_options(const AlignOptions& command) {
   if (command.mesh.empty() && command.scene.empty())
     return usage_error(
         "expected a CAD file (--mesh and --units) or a --scene with a prototype, found neither.");
@@ -293,9 +293,9 @@ Result<scene::Mesh> mesh_of(const AlignOptions& command) {
 
 }  // namespace
 
-Result<MeshAligned> written_alignment(const AlignOptions& command) {
+Result<MeshAligned> align_scan(const AlignOptions& command) {
   const auto begun = std::chrono::steady_clock::now();
-  LIMN_TRY_STATUS(checked(command));
+  LIMN_TRY_STATUS(check_options(command));
   const double metres = command.mesh.empty() ? 1 : scene::metres_per_unit(*command.units);
   LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
   LIMN_TRY(const auto start, start_of(command, metres));
@@ -309,11 +309,11 @@ Result<MeshAligned> written_alignment(const AlignOptions& command) {
   const auto residuals = calib::residuals(index, scan, aligned.registration, k_residual_reach_m);
   const auto differences =
       calib::differences(scan, residuals, aligned.registration, {.least_m = 1e-3 * command.least_mm});
-  for (std::size_t i = 0; i < std::min(k_told, differences.size()); ++i)
+  for (std::size_t i = 0; i < std::min(k_most_printed, differences.size()); ++i)
     aligned.warnings.push_back(text_of(differences[i]));
-  if (differences.size() > k_told)
+  if (differences.size() > k_most_printed)
     aligned.warnings.push_back(
-        fmt::format("{} smaller regions also differ: see align.json", differences.size() - k_told));
+        fmt::format("{} smaller regions also differ: see align.json", differences.size() - k_most_printed));
 
   LIMN_TRY_STATUS(make_folder(command.out));
   const scene::ScanSurface map = coloured(scan, residuals, aligned.registration.world_from_prototype);

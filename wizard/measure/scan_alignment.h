@@ -39,6 +39,6 @@ struct MeshAligned {
 /// the scan differ. With a body it also writes markers.json (limn.markers/1), for a scene's
 /// prototype.markers. Without a start the whole scan is searched. The alignment is computed before the first
 /// file is written.
-Result<MeshAligned> written_alignment(const AlignOptions& command);
+Result<MeshAligned> align_scan(const AlignOptions& command);
 
 }  // namespace limn::wizard

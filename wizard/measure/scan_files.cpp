@@ -138,10 +138,10 @@ double stddev_mm(const calib::Scan& scan, double share) {
   return 1e3 * percentile(scan.points.stddevs, share);
 }
 
-Result<calib::Scan> written_scan(const calib::CaptureSet& captures,
-                                 const Rig& rig,
-                                 const calib::ScanOptions& options,
-                                 const std::filesystem::path& out) {
+Result<calib::Scan> make_scan(const calib::CaptureSet& captures,
+                              const Rig& rig,
+                              const calib::ScanOptions& options,
+                              const std::filesystem::path& out) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY(calib::Scan scan, calib::scan_captures(captures, rig, options));
   LIMN_TRY_STATUS(write_scan(scan, 1e-3 * milliseconds_since(begun), out));

@@ -107,7 +107,7 @@ Status measure_vignetting(const calib::CaptureSet& captures,
 
 }  // namespace
 
-Result<calib::Report> solved(const SolveCommandOptions& options) {
+Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
   LIMN_TRY(const calib::CaptureSet captures, captures_of(options));

@@ -36,6 +36,6 @@ struct SolveCommandOptions {
 
 /// Solves captures and writes the rig folder (rig.json, .cameramodel files, report.json, report.html,
 /// observations.json). If the solve fails, at most report.json is written, with the faults that explain it.
-Result<calib::Report> solved(const SolveCommandOptions& options);
+Result<calib::Report> solve_captures(const SolveCommandOptions& options);
 
 }  // namespace limn::wizard

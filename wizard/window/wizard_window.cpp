@@ -56,9 +56,9 @@ class Progress {
                   const std::lock_guard lock(mutex_);
                   view_.light = light;
                 },
-            .aims = [this](int pose) { aims(pose); },
+            .pose_begins = [this](int pose) { pose_begins(pose); },
             .solved = [this](const calib::Report& report) { solved(report, view_.judged.size()); },
-            .judges = [this](int pose) { judges(pose); },
+            .judging_begins = [this](int pose) { judging_begins(pose); },
             .judged =
                 [this](const PoseJudged& judged, const calib::Observations& observations,
                        const std::vector<calib::Fault>& faults) {
@@ -158,7 +158,7 @@ class Progress {
     }
   }
 
-  void aims(int pose) {
+  void pose_begins(int pose) {
     const std::lock_guard lock(mutex_);
     const auto at = static_cast<std::size_t>(pose);
     view_.pose = pose;
@@ -171,7 +171,7 @@ class Progress {
     }
   }
 
-  void judges(int pose) {
+  void judging_begins(int pose) {
     const std::lock_guard lock(mutex_);
     view_.pose = pose;
     view_.place = plan_.places[static_cast<std::size_t>(pose)];
@@ -217,13 +217,13 @@ class Progress {
 
 }  // namespace
 
-Result<Calibrated> calibrated_in_window(gui::GuiWindow* window,
-                                        const WizardPlan& plan,
-                                        const WizardBackend& backend,
-                                        const std::function<void(const std::string&)>& say,
-                                        std::atomic<WizardWish>* wish,
-                                        MainThreadExecutor* executor,
-                                        const WizardWork& work) {
+Result<Calibrated> calibrate_in_window(gui::GuiWindow* window,
+                                       const WizardPlan& plan,
+                                       const WizardBackend& backend,
+                                       const std::function<void(const std::string&)>& say,
+                                       std::atomic<WizardWish>* wish,
+                                       MainThreadExecutor* executor,
+                                       const WizardWork& work) {
   Progress progress(plan, wish);
   auto running = std::async(std::launch::async, [&]() -> Result<Calibrated> {
     try {

@@ -26,18 +26,18 @@ struct WizardPlan {
   std::function<std::vector<std::vector<std::vector<Eigen::Vector2d>>>(const Rig&)> targets_by = nullptr;
 };
 
-/// The wizard's work: calibrated() with these backend and this listener.
+/// The wizard's work: calibrate_rig() with these backend and this listener.
 using WizardWork = std::function<Result<Calibrated>(const WizardBackend&, const WizardListener&)>;
 
 /// Runs the work in a thread of its own and shows it in the window until the person closes the window.
 /// `executor` runs what the work needs done in this thread. `say` gets the lines of text, too. `wish` gets
 /// the person's requests. If the window is closed early, the work stops, and its error is returned.
-Result<Calibrated> calibrated_in_window(gui::GuiWindow* window,
-                                        const WizardPlan& plan,
-                                        const WizardBackend& backend,
-                                        const std::function<void(const std::string&)>& say,
-                                        std::atomic<WizardWish>* wish,
-                                        MainThreadExecutor* executor,
-                                        const WizardWork& work);
+Result<Calibrated> calibrate_in_window(gui::GuiWindow* window,
+                                       const WizardPlan& plan,
+                                       const WizardBackend& backend,
+                                       const std::function<void(const std::string&)>& say,
+                                       std::atomic<WizardWish>* wish,
+                                       MainThreadExecutor* executor,
+                                       const WizardWork& work);
 
 }  // namespace limn::wizard

@@ -12,7 +12,7 @@
 namespace limn::remote {
 
 /// What the session reports to the remote at one moment.
-struct SessionNews {
+struct SessionUpdate {
   SessionState state;
   std::vector<cv::Mat> projector_images;  ///< As they are shown, 8-bit BGR; they are not changed any more.
   std::vector<scene::Look> looks;
