@@ -399,7 +399,7 @@ struct BundleAdjuster::Problem {
   Parameters there{};
   NormalEquations at_there{};
   Step step{};
-  double last_gain = 1;  // of the cost, in the last step that was accepted
+  double last_gain = 1;  // decrease of the cost in the last accepted step
 
   double cost() const { return at_here.cost; }
   bool solve(double damping) {

@@ -123,7 +123,7 @@ Result<SurfaceMixing> surface_mixing(const MeasuredSurface& surface, std::span<c
   for (const cv::Mat& image : irradiance) illuminated.push_back(well_illuminated(image));
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   std::size_t measured = 0;
-  std::vector<Eigen::Vector3f> whites;  // of each pixel, with all projectors at white
+  std::vector<Eigen::Vector3f> whites;  // light of each pixel with all projectors at white
   for (int row = 0; row < size.height; ++row)
     for (int column = 0; column < size.width; ++column) {
       Eigen::Vector3f white = Eigen::Vector3f::Zero();

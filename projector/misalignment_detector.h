@@ -92,7 +92,7 @@ class MisalignmentDetector {
     double contrast = 0;  // sum of the weights contrast x share
   };
   static Sum empty_sum();
-  std::vector<Sum> current_, total_;  // of the current frame; of all frames, with forgetting
+  std::vector<Sum> current_, total_;  // the current frame; all frames, with forgetting
 };
 
 }  // namespace limn::projector

@@ -8,7 +8,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int k_niceness = 10;  // of the computation, so that drawing has priority
+constexpr int k_niceness = 10;  // niceness of the computation, so that drawing has priority
 constexpr auto k_look_again = std::chrono::milliseconds(5);
 constexpr const char* k_ended = "the session was ended.";
 

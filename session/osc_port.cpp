@@ -13,7 +13,7 @@ namespace {
 constexpr auto k_longest_receiving = std::chrono::milliseconds(5);
 constexpr auto k_between_refusals = std::chrono::seconds(1);
 constexpr auto k_between_all = std::chrono::seconds(1);
-constexpr float k_same_mm = 0.05F, k_same_turn = 0.0003F;  // of a quaternion: 0.03 degrees
+constexpr float k_same_mm = 0.05F, k_same_turn = 0.0003F;  // mm; quaternion element, 0.03 degrees
 
 std::vector<OscValue> values_of(const Pose& pose) {
   const Eigen::Vector3f mm = (1e3 * pose.translation).cast<float>();

@@ -29,7 +29,7 @@ class Quantiles {
 
 /// Measurements of one frame, from the camera to the projected light.
 struct ShownFrame {
-  Stamp captured_at;  ///< of the newest camera image that was used
+  Stamp captured_at;  ///< when the newest camera image that was used was taken
   Stamp shown_at;
   double detect_ms = 0, filter_ms = 0, paint_ms = 0, screen_ms = 0, record_ms = 0;
   int markers = 0;           ///< in the newest images

@@ -255,7 +255,7 @@ void add_disc(scene::Mesh& mesh,
 
 struct MirrorStyle {
   std::string name;
-  double half_width, half_height, depth;  // of the housing, m
+  double half_width, half_height, depth;  // the housing, m
   double roundness;                       // superellipse: 2 round … 6 boxy
   double taper;                           // relative reduction in height of the inner side
   Vector3d centre;                        // centre of the glass, in the part's frame

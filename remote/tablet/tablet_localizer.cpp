@@ -13,12 +13,12 @@ namespace {
 constexpr int k_lens_side = 1280;           // px, the longer side of the image size that lenses are kept for
 constexpr std::size_t k_max_aspects = 4;    // aspect ratios of one device
 constexpr double k_gate_px = 2;             // a marker was moved if its residual exceeds this
-constexpr double k_gate_of_median = 4;      // and this multiple of the median residual
+constexpr double k_gate_of_median = 4;      // multiple of the median residual
 constexpr double k_min_chi_square_gap = 9;  // between a lone marker's pose and its mirrored one
-constexpr double k_max_stddev_px = 8;       // of the pose, as it shows in the image at the markers' distance
+constexpr double k_max_stddev_px = 8;       // pose error in the image at the markers' distance
 constexpr double k_noticeable_px = 0.15;    // change of the lens anywhere in the image
-constexpr double k_known_share = 0.03;  // of the focal length: below it the lens is used to straighten sides
-constexpr double k_better_share = 0.8;  // of the standard deviation: an improvement that is worth saving
+constexpr double k_known_share = 0.03;      // focal length error below which the lens straightens sides
+constexpr double k_better_share = 0.8;      // reduction of the standard deviation that is worth saving
 
 using tracker::BodyCorrespondences;
 using tracker::PoseFit;
@@ -120,7 +120,7 @@ std::vector<Track> moved_markers(const Imager& view,
     const BodyCorrespondences corners = tracker::correspondences(*body, std::span(&here, 1));
     const Pose expected = view.imager_from_world * track.world_from_body;
     if (corners.empty() || misfit(corners[0], expected) <= gate_px) continue;
-    // Of two ambiguous poses the one whose rotation is nearer to the old track.
+    // Takes the one of two ambiguous poses whose rotation is nearer to the old track.
     std::optional<PoseFit> best;
     for (const PoseFit& fit : tracker::minima(corners))
       if (!best || angle_between(fit.world_from_body.rotation, expected.rotation) <

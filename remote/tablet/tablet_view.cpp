@@ -35,7 +35,7 @@
 namespace limn::remote {
 namespace {
 
-constexpr int k_quality = 80;  // of JPEG
+constexpr int k_quality = 80;  // JPEG quality, 0 to 100
 constexpr projector::Smoothing k_smoothing{.samples = 4, .least_step = 0.25};
 constexpr int k_niceness = 19;                      // the lowest priority: sessions and servers go first
 constexpr std::size_t k_max_devices_in_memory = 8;  // the device that was not used longest is dropped
@@ -129,7 +129,7 @@ struct TabletView::Impl {
     std::string name;
     TabletLocalizer localizer;
     SplitDrawState draw_state;
-    TabletViewMode parts = TabletViewMode::as_screen;  // of the last image
+    TabletViewMode parts = TabletViewMode::as_screen;  // what the last image shows
   };
   std::deque<Device> devices;                                     // in the order of their last use
   SplitDrawState room{{.is_viewer = true}, {.is_viewer = true}};  // as the room's screen

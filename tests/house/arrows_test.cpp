@@ -492,5 +492,35 @@ TEST(House, FunctionsSayWhatTheyDoToWhat) {
   EXPECT_GT(seen, 400) << "the sources were not found";
 }
 
+// Lines on which a comment begins with "of", which says what it belongs to but not what it is. Lines that
+// continue a comment do not count.
+std::vector<int> comments_without_subject(const std::string& text) {
+  static const std::regex begins(R"((^|.*[^:])//+<?\s*[Oo]f\b.*)"), comment(R"(\s*//.*)");
+  std::vector<int> lines;
+  std::istringstream in(text);
+  bool was_comment = false;
+  int number = 0;
+  for (std::string line; std::getline(in, line);) {
+    ++number;
+    const bool is_comment = std::regex_match(line, comment);
+    if (!(is_comment && was_comment) && std::regex_match(line, begins)) lines.push_back(number);
+    was_comment = is_comment;
+  }
+  return lines;
+}
+
+TEST(House, CommentsHaveASubject) {
+  EXPECT_EQ(
+      comments_without_subject("int a;  ///< of the image\n// Of two poses\n// the median\n// of all\n"),
+      (std::vector<int>{1, 2}));
+  for (const auto& [room, may] : allowed()) {
+    for (const fs::path& file : code_in(root() / room)) {
+      std::ifstream in(file);
+      for (const int line : comments_without_subject({std::istreambuf_iterator<char>(in), {}}))
+        ADD_FAILURE() << fs::relative(file, root()) << ":" << line << ": the comment begins with \"of\"";
+    }
+  }
+}
+
 }  // namespace
 }  // namespace limn
