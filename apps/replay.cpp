@@ -203,7 +203,7 @@ class Recording final : public session::FrameClock, public session::FrameSource 
 
   void wait_for(Stamp shown_at) {
     if (options_.step) {
-      fmt::print(stderr, "{:.3f} s; press enter for the next image\n", seconds_between(Stamp{}, shown_at));
+      fmt::print(stderr, "{:.3f} s; press enter for the next image\n", seconds_of(shown_at));
       std::string line;
       std::getline(std::cin, line);
       return;
@@ -237,7 +237,7 @@ class Comparison final : public session::FrameSink {
 
   Status show(const session::ComposedFrame& painted, const std::vector<cv::Mat>&) override {
     ++images_;
-    const double at_s = seconds_between(Stamp{}, painted.shown_at);
+    const double at_s = seconds_of(painted.shown_at);
     if (session::pose_log(painted) != recording_->painted().poses && ++other_poses_ == 1) first_pose_ = at_s;
     const std::string print = fmt::format("{:016x}", session::fingerprint(painted.projectors));
     if (print != recording_->painted().images && ++other_images_ == 1) first_image_ = at_s;

@@ -16,6 +16,8 @@ inline Stamp now() { return std::chrono::time_point_cast<Stamp::duration>(Stamp:
 inline double seconds_between(Stamp from, Stamp to) {
   return std::chrono::duration<double>(to - from).count();
 }
+/// Seconds on the clock of the stamp, as recordings and telemetry store them.
+inline double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
 /// `at` moved by a number of seconds.
 inline Stamp shifted(Stamp at, double seconds) {
   return at + std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(seconds));

@@ -144,7 +144,7 @@ OperatorView OperatorConsole::view_of(const Session& session,
   view.recalibration_progress = session.recalibration().progress;
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
-  const double begun_s = seconds_between(Stamp{}, *begun_at_);
+  const double begun_s = seconds_of(*begun_at_);
   for (std::size_t i = notes.size() > k_notices ? notes.size() - k_notices : 0; i < notes.size(); ++i)
     view.notices.push_back({notes[i].first - begun_s, notes[i].second});
   return view;

@@ -9,8 +9,6 @@
 namespace limn::session {
 namespace {
 
-double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
-
 void print_summary(const nlohmann::ordered_json& json) {
   for (const auto& [key, value] : json.items()) {
     if (value.is_object())

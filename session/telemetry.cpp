@@ -100,9 +100,9 @@ void Telemetry::add(const ShownFrame& frame) {
   add_to_slice(frame, latency_ms);
   if (!csv_.is_open()) return;
   csv_.add(fmt::format("{:.6f},{:.6f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{},{},{},{:.4f}\n",
-                       seconds_between(Stamp{}, frame.captured_at), seconds_between(Stamp{}, frame.shown_at),
-                       latency_ms, frame.detect_ms, frame.filter_ms, frame.paint_ms, frame.screen_ms,
-                       frame.record_ms, frame.markers, frame.lost, frame.missed, frame.placement_mm),
+                       seconds_of(frame.captured_at), seconds_of(frame.shown_at), latency_ms, frame.detect_ms,
+                       frame.filter_ms, frame.paint_ms, frame.screen_ms, frame.record_ms, frame.markers,
+                       frame.lost, frame.missed, frame.placement_mm),
            frame.shown_at);
   if (const auto message = csv_.take_message()) note(frame.shown_at, *message);
 }
@@ -127,7 +127,7 @@ void Telemetry::add_to_slice(const ShownFrame& frame, double latency_ms) {
 }
 
 void Telemetry::note(Stamp at, const std::string& what) {
-  notes_.emplace_back(seconds_between(Stamp{}, at), what);
+  notes_.emplace_back(seconds_of(at), what);
   if (notes_.size() > k_most_notes) notes_.erase(notes_.begin());
 }
 

@@ -14,8 +14,6 @@
 namespace limn::session {
 namespace {
 
-double seconds_of(Stamp at) { return seconds_between(Stamp{}, at); }
-
 // RMS distance (mm, on the prototype) of the parts' origins from their true positions when the light arrives;
 // -1 when no part is shown.
 double placement_mm(const ComposedFrame& composed,

@@ -13,7 +13,7 @@ namespace limn::validate {
 namespace {
 
 constexpr double k_over = 4;  // levels by which a pixel may be off
-constexpr double k_edge =
+constexpr double k_edge_levels =
     8;  // levels between neighbours; above it, the sampling of a pixel matters more than its colour
 constexpr double k_difference_gain = 32;  // 4/255 becomes 128
 
@@ -23,7 +23,7 @@ cv::Mat nearly_even(const cv::Mat& image) {
   cv::Mat highest, lowest;
   cv::dilate(image, highest, around);
   cv::erode(image, lowest, around);
-  return ~any_channel_over(highest - lowest, k_edge);
+  return ~any_channel_over(highest - lowest, k_edge_levels);
 }
 
 }  // namespace

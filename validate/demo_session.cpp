@@ -75,7 +75,7 @@ class PhaseTimes {
 };
 
 // What the session knows (never the ground truth), and the renderer that it draws with.
-struct Session {
+struct DemoSession {
   Rig rig;
   double held_out_px;  // held-out error of its calibration
   scene::Scene scene;
@@ -105,7 +105,7 @@ Result<cv::Mat> photograph(sim::VirtualRig* room) {
 }
 
 // Photographs the room without projected light and finds everything in the image.
-Result<Moment> track_moment(Session* session,
+Result<Moment> track_moment(DemoSession* session,
                             sim::VirtualRig* room,
                             const std::vector<std::string>& variants) {
   room->darken();
@@ -158,7 +158,7 @@ cv::Mat photographed_from(const sim::World& world, const Imager& viewer, const s
 }
 
 // A renderer of the target dots instead of the scene's parts, on the same prototype.
-Result<projector::Renderer> dots_renderer(const Session& session, const TargetDots& dots) {
+Result<projector::Renderer> dots_renderer(const DemoSession& session, const TargetDots& dots) {
   scene::Scene scene = session.scene;
   scene::Slot slot;
   slot.name = "dots";
@@ -174,7 +174,7 @@ struct JudgedDots {
 };
 
 // Compares the light of the calibrated rig with the ground truth, with the door where the tracker says it is.
-Result<JudgedDots> judge(const Session& session, const sim::World& world, const Moment& moment) {
+Result<JudgedDots> judge(const DemoSession& session, const sim::World& world, const Moment& moment) {
   const TargetDots dots = target_dots(world, k_judged_points, k_judged_seed);
   LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
   const Pose& world_from_prototype = *moment.posed.world_from_prototype;
@@ -202,7 +202,7 @@ cv::Mat merged_true_masks(const sim::Truth& truth, const scene::Scene& scene, co
 
 // Distance of the first part's outline in the camera's image from the ray-traced one, at twice the
 // resolution.
-double composite_error_px(Session* session,
+double composite_error_px(DemoSession* session,
                           const sim::World& world,
                           const sim::Truth& truth,
                           const Moment& moment) {
@@ -238,7 +238,7 @@ struct Place {
 
 Result<Place> judge_place(const std::string& name,
                           const Pose& world_from_prototype,
-                          Session* session,
+                          DemoSession* session,
                           sim::VirtualRig* room,
                           PhaseTimes* phases) {
   room->move("prototype", world_from_prototype);
@@ -259,10 +259,10 @@ std::vector<std::pair<std::string, Pose>> places_of(const Pose& world_from_proto
 }
 
 // Captures and calibrates, and sets up the session with the calibrated rig.
-Result<Session> calibrate(const fs::path& out,
-                          sim::VirtualRig* room,
-                          PhaseTimes* phases,
-                          bool keep_captures) {
+Result<DemoSession> calibrate(const fs::path& out,
+                              sim::VirtualRig* room,
+                              PhaseTimes* phases,
+                              bool keep_captures) {
   const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
   std::error_code ignored;
   fs::remove_all(captures, ignored);
@@ -281,16 +281,16 @@ Result<Session> calibrate(const fs::path& out,
   const auto names = tracker::families_of(bodies);
   LIMN_TRY(tracker::Families families, tracker::Families::load(names));
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
-  return Session{rig,
-                 report.assessment.held_out.rms_px,
-                 std::move(scene),
-                 std::move(bodies),
-                 tracker::Detector(std::move(families)),
-                 std::move(renderer)};
+  return DemoSession{rig,
+                     report.assessment.held_out.rms_px,
+                     std::move(scene),
+                     std::move(bodies),
+                     tracker::Detector(std::move(families)),
+                     std::move(renderer)};
 }
 
 // What the demo measured.
-struct Measurement {
+struct DemoMeasurement {
   double held_out_px = 0;
   std::vector<Place> places;
   double composite_px = 0;
@@ -303,7 +303,7 @@ std::string readable(std::string name) {
   return name;
 }
 
-std::vector<DemoRow> rows_of(const Measurement& measured) {
+std::vector<DemoRow> rows_of(const DemoMeasurement& measured) {
   std::vector<DemoRow> rows;
   const auto at_most = [&](const std::string& what, double value, const char* unit, double limit) {
     rows.push_back({what, fmt::format("{:.3f} {}", value, unit), fmt::format("at most {:g} {}", limit, unit),
@@ -336,7 +336,7 @@ std::vector<DemoRow> rows_of(const Measurement& measured) {
   return rows;
 }
 
-nlohmann::ordered_json json_of(const Measurement& measured) {
+nlohmann::ordered_json json_of(const DemoMeasurement& measured) {
   nlohmann::ordered_json json = {{"held_out_px", measured.held_out_px}};
   for (const Place& place : measured.places) {
     const Registration& found = place.judged.registration;
@@ -351,7 +351,9 @@ nlohmann::ordered_json json_of(const Measurement& measured) {
 }
 
 // Images for people: what the renderer draws and what the simulator photographs.
-Result<std::vector<DemoImage>> session_images(Session* session, sim::VirtualRig* room, const Place& place) {
+Result<std::vector<DemoImage>> session_images(DemoSession* session,
+                                              sim::VirtualRig* room,
+                                              const Place& place) {
   const scene::PosedScene& posed = place.moment.posed;
   const Pose& world_from_prototype = *posed.world_from_prototype;
   const Imager viewer = designer_viewer(world_from_prototype);
@@ -408,7 +410,10 @@ Result<std::vector<DemoImage>> session_images(Session* session, sim::VirtualRig*
 }
 
 // Overlap of the masks from the designer's viewpoint with the ray-traced ones.
-double mask_iou(Session* session, const sim::World& world, const sim::Truth& truth, const Moment& moment) {
+double mask_iou(DemoSession* session,
+                const sim::World& world,
+                const sim::Truth& truth,
+                const Moment& moment) {
   const Imager viewer = designer_viewer(*moment.posed.world_from_prototype);
   const cv::Mat found =
       merged_masks(session->renderer.coverage(moment.posed, viewer), {viewer.width, viewer.height});
@@ -423,8 +428,8 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
            sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image));
   sim::VirtualRig room(std::move(world));
   PhaseTimes phases;
-  LIMN_TRY(Session session, calibrate(out, &room, &phases, keep_captures));
-  Measurement measured;
+  LIMN_TRY(DemoSession session, calibrate(out, &room, &phases, keep_captures));
+  DemoMeasurement measured;
   measured.held_out_px = session.held_out_px;
   const Pose in_place = room.world().world_from_prototype;
   for (const auto& [name, world_from_prototype] : places_of(in_place)) {

@@ -29,7 +29,7 @@ constexpr int k_tries_per_dot = 30;  // random points, to place dots as close as
 constexpr double k_border_px = 4;    // dots stay this far from the border of a projector's image
 constexpr double k_dot_lift_m = 0.0002;
 // 70 degrees. At larger angles a dot is under two projector pixels wide and its centroid is not accurate.
-constexpr double k_min_incidence_cosine = 0.34;
+constexpr double k_min_dot_cosine = 0.34;
 
 // Points on the rim of a disc around a sample, in the tangent plane.
 std::vector<Eigen::Vector3d> rim(const sim::SampledPoint& sample, double radius_m) {
@@ -57,7 +57,7 @@ bool reached_by(const sim::World& world,
   const Eigen::Vector3d p_light = projector.imager_from_world.inverse().translation;
   const Eigen::Vector3d p_world = world.world_from_prototype * sample.p;
   const Eigen::Vector3d n_world = world.world_from_prototype.rotation * sample.n;
-  if (n_world.dot((p_light - p_world).normalized()) < k_min_incidence_cosine) return false;
+  if (n_world.dot((p_light - p_world).normalized()) < k_min_dot_cosine) return false;
   if (!well_inside(projector, p_world)) return false;
   std::vector<Eigen::Vector3d> places = rim(sample, free_radius_m);
   places.push_back(sample.p);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int k_seam_window = 9;  // viewer pixels, the window of a step
 // 70 degrees. At larger angles a projector's pixel is stretched threefold.
-constexpr double k_min_incidence_cosine = 0.34;
+constexpr double k_min_seam_cosine = 0.34;
 // Viewer pixels. Within 4 of where light ends it fades: over the last projector pixel, about 3 viewer pixels
 // wide at 70 degrees, and the viewer's blur.
 constexpr int k_light_end = 9;
@@ -65,7 +65,7 @@ cv::Mat even_light_mask(CheckRun& run) {
     const Eigen::Vector3f p_light = p_projector(run, i);
     cv::Mat steep(samples.height, samples.width, CV_32F, cv::Scalar(0));
     for (std::size_t k = 0; k < steep.total(); ++k)
-      if (samples.n_world[k].dot((p_light - samples.p_world[k]).normalized()) > k_min_incidence_cosine)
+      if (samples.n_world[k].dot((p_light - samples.p_world[k]).normalized()) > k_min_seam_cosine)
         steep.at<float>(static_cast<int>(k)) = 1;
     mask |= (run.fine_reaches()[i] > k_whole) & (binned(steep, k_finer) > k_whole);
   }

@@ -22,10 +22,10 @@ constexpr int k_allowed_frames = 3;    // from the start of a shadow until it mu
 constexpr float k_least_loss = 0.05F;  // share of a pixel's light; a smaller loss is not a shadow
 constexpr int k_least_pixels = 100;    // smallest number of pixels of a shadow
 constexpr int k_blur_px = 5;           // pixels of the viewer's image over which light is averaged
-constexpr int k_light_end = 9;         // pixels; nearer to its end, light fades over a projector's last pixel
+constexpr int k_fade_px = 9;           // pixels; nearer to its end, light fades over a projector's last pixel
 constexpr float k_least_light =
     0.1F;  // share of the brightest light; flashes on darker pixels are not visible
-constexpr float k_edge =
+constexpr float k_edge_share =
     0.1F;  // share of the light between neighbours; above it, differences between projectors' pixels show
 constexpr double k_skin_bgr[] = {0.28, 0.40, 0.62};
 
@@ -65,13 +65,13 @@ struct Traced {
   sim::Samples viewer;
 };
 
-class Session {
+class ShadowFillSession {
  public:
-  Session(const sim::World& world,
-          const scene::PosedScene& posed,
-          const Imager& viewer,
-          const Hand& hand,
-          std::uint64_t seed)
+  ShadowFillSession(const sim::World& world,
+                    const scene::PosedScene& posed,
+                    const Imager& viewer,
+                    const Hand& hand,
+                    std::uint64_t seed)
       : world_(world), posed_(posed), viewer_(viewer), hand_(hand), seed_(seed) {}
 
   Result<ShadowFillReading> run(const scene::Scene& scene) {
@@ -248,11 +248,11 @@ class Session {
   // The largest light above that without the hand, away from edges and from where all light ends.
   double flash(const Traced& traced, const cv::Mat& actual) const {
     cv::Mat wanted = blurred(grey(before_)), found = blurred(grey(actual)), highest, lowest, where;
-    const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {k_light_end, k_light_end});
+    const cv::Mat around = cv::getStructuringElement(cv::MORPH_RECT, {k_fade_px, k_fade_px});
     cv::dilate(wanted, highest, around);
     cv::erode(wanted, lowest, around);
     cv::erode(whole(traced.viewer) & is_light(wanted), where, around);
-    where &= highest - lowest < k_edge * wanted;
+    where &= highest - lowest < k_edge_share * wanted;
     double worst = 0;
     cv::minMaxLoc(found / wanted - 1, nullptr, &worst, nullptr, nullptr, where);
     return std::max(0.0, worst);
@@ -286,7 +286,7 @@ Result<ShadowFillReading> measure_shadow_fill(const sim::World& world,
                                               const Imager& viewer,
                                               const Hand& hand,
                                               std::uint64_t seed) {
-  return Session(world, posed, viewer, hand, seed).run(scene);
+  return ShadowFillSession(world, posed, viewer, hand, seed).run(scene);
 }
 
 }  // namespace limn::validate

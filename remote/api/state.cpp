@@ -104,7 +104,7 @@ SessionState session_state(const session::Session& session,
   for (const session::LooseMarker& loose : session::waiting_markers(scene, show_state, session.percepts()))
     out.waiting.push_back(loose.marker.text());
   const auto& notes = telemetry.notes();
-  const double begun_s = seconds_between(Stamp{}, begun_at);
+  const double begun_s = seconds_of(begun_at);
   for (std::size_t i = notes.size() > k_max_notes ? notes.size() - k_max_notes : 0; i < notes.size(); ++i)
     out.notes.push_back({notes[i].first - begun_s, notes[i].second});
   out.last_edit = session.last_edit();
