@@ -164,7 +164,7 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
     const Percepts& percepts = perception.watch(*taken);
     const double was_watched = processor_ms();
     seen.put(percepts);
-    const auto known = seen.take({});
+    const auto known = seen.take_newest({});
     const auto tracks = tracker::predicted(known->motions, shifted(captured_at, k_lag_s));
     const double was_handed = processor_ms();
     markers += percepts.detections[0].size();
