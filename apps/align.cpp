@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "core/log.h"
+#include "core/print.h"
 
 namespace limn::apps {
 
@@ -16,15 +17,15 @@ Status run_align(const AlignCommand& command) {
   for (const std::string& warning : aligned.warnings) log_warning("align: {}", warning);
   if (command.json) {
     LIMN_TRY(const std::string json, read_file(command.out / "align.json"));
-    fmt::print("{}", json);
+    print_out("{}", json);
     return {};
   }
   if (command.scan.empty()) {
-    fmt::print("pose from {}; files in {}\n", aligned.how, command.out.string());
+    print_out("pose from {}; files in {}\n", aligned.how, command.out.string());
     return {};
   }
   const auto stddev = [&](int i) { return std::sqrt(aligned.registration.covariance(i, i)); };
-  fmt::print(
+  print_out(
       "{} of {} points fit within {:.3f} mm RMS; standard deviation {:.3f} mm, {:.4f} degrees; files in {}\n",
       aligned.registration.used, aligned.registration.near, 1e3 * aligned.registration.rms_m,
       1e3 * std::max({stddev(3), stddev(4), stddev(5)}),

@@ -9,7 +9,9 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "device/devices_file.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_folder.h"
@@ -67,7 +69,7 @@ std::string to_json(const wizard::Calibrated& done) {
     if (seen->align_rms_mm) json["prototype"]["align_rms_mm"] = *seen->align_rms_mm;
   }
   if (!done.no_prototype.empty()) json["no_prototype"] = done.no_prototype;
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 void say_end(const CalibrateOptions& options, const wizard::Calibrated& done, const Say& say) {
@@ -118,7 +120,7 @@ Status play(const CalibrateOptions& options,
             wizard::MainThreadExecutor* executor) {
   const Say say = [&](const std::string& line) {
     if (options.json) return log_info("{}", line);
-    fmt::print("{}\n", line);
+    print_out("{}\n", line);
     std::fflush(stdout);
   };
   const wizard::WizardWork work = [&](const wizard::WizardBackend& where,
@@ -130,7 +132,7 @@ Status play(const CalibrateOptions& options,
            window ? wizard::calibrate_in_window(&*window, plan, backend, say, wish, executor, work)
                   : work(backend, {.say = say}));
   say_end(options, done, say);
-  if (options.json) fmt::print("{}", to_json(done));
+  if (options.json) print_out("{}", to_json(done));
   return {};
 }
 

@@ -10,8 +10,10 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/print.h"
 #include "device/gl_context.h"
 #include "validate/check_file.h"
 #include "validate/check_judge.h"
@@ -151,13 +153,13 @@ Status run_check(const CheckOptions& options) {
     results.push_back(std::move(*result));
   }
   const auto json = json_of(results, context.description());
-  LIMN_TRY_STATUS(write_file(options.out / "check.json", json.dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_file(options.out / "check.json", json_text(json, 2) + "\n"));
   const fs::path page = options.out / "check.html";
   LIMN_TRY_STATUS(validate::write_check_page(results, context.description(), page));
   if (options.json) {
-    fmt::print("{}\n", json.dump(2));
+    print_out("{}\n", json_text(json, 2));
   } else {
-    fmt::print("{}{}\n", validate::check_table(results), page.string());
+    print_out("{}{}\n", validate::check_table(results), page.string());
   }
   return verdict_of(results, page);
 }

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <functional>
-#include <iostream>
 #include <memory>
+#include <new>
+#include <opencv2/core.hpp>
 #include <optional>
+#include <system_error>
 
 #include "apps/align.h"
 #include "apps/bench.h"
@@ -32,6 +34,7 @@
 #include "core/enum_names.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/print.h"
 #include "core/version.h"
 
 namespace limn::apps {
@@ -663,6 +666,8 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--osc", options->osc,
                       "PORT or ADDRESS:PORT at which OSC messages of other programs are received; a port "
                       "alone accepts this machine only");
+  command->add_option("--osc-from", options->osc_from,
+                      "Numeric address of the only machine whose OSC messages are accepted");
   command->add_option("--osc-to", options->osc_to, "HOST:PORT to which changes are sent by OSC");
   command->add_option("--serve", options->serve,
                       "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
@@ -742,7 +747,17 @@ void add_doctor(CLI::App& app, Run& run) {
 
 }  // namespace
 
-int run_command_line(int argc, char** argv) {
+namespace {
+
+Error out_of_memory() {
+  return error("expected enough memory for this work, found none left. Use smaller images.");
+}
+
+Error bug(const std::exception& problem) {
+  return error("this is a bug in Limn, please report it: {}", problem.what());
+}
+
+int run_arguments(int argc, char** argv) {
   CLI::App app{"Limn paints virtual parts onto a physical prototype with light."};
   app.name("limn");
   app.set_version_flag("--version", fmt::format("limn {}", version()), "Print the version and exit");
@@ -771,7 +786,7 @@ int run_command_line(int argc, char** argv) {
   add_doctor(app, run);
 
   if (argc == 1) {
-    std::cout << app.help() << std::flush;
+    print_text(app.help());
     return 2;
   }
   const auto commands = app.get_subcommands({});
@@ -793,10 +808,27 @@ int run_command_line(int argc, char** argv) {
         error("{}: expected a file or folder that can be opened, found: {}. Check its name and permissions.",
               problem.path1().string(), problem.code().message()));
   } catch (const std::bad_alloc&) {
-    return report_result(error("expected enough memory for this work, found none left. Use smaller images."));
-  } catch (const std::exception& bug) {
-    return report_result(error("this is a bug in Limn, please report it: {}", bug.what()));
+    return report_result(out_of_memory());
+  } catch (const cv::Exception& problem) {
+    if (problem.code == cv::Error::StsNoMem) return report_result(out_of_memory());
+    return report_result(bug(problem));
+  } catch (const std::system_error& problem) {
+    if (problem.code() == std::errc::resource_unavailable_try_again)
+      return report_result(
+          error("expected another thread for this work, found none left. End other programs, "
+                "or raise the limit (ulimit -u)."));
+    return report_result(bug(problem));
+  } catch (const std::exception& problem) {
+    return report_result(bug(problem));
   }
+}
+
+}  // namespace
+
+int run_command_line(int argc, char** argv) {
+  const int code = run_arguments(argc, argv);
+  const int output = report_result(flush_output());
+  return code != 0 ? code : output;
 }
 
 }  // namespace limn::apps

@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/image_io.h"
+#include "core/print.h"
 #include "device/gl_context.h"
 #include "device/window.h"
 #include "validate/demo_page.h"
@@ -59,7 +60,7 @@ Status run_demo(const DemoOptions& options) {
   }
   LIMN_TRY(const validate::DemoResult result, validate::play_demo(options.out, options.keep_captures));
   LIMN_TRY_STATUS(write_results(options.out, result));
-  fmt::print("{}\n{}\n", validate::text_table(result.rows), (options.out / "demo.html").string());
+  print_out("{}\n{}\n", validate::text_table(result.rows), (options.out / "demo.html").string());
   std::fflush(stdout);
   if (window) show_in(*window, result.images);
   return {};

@@ -10,13 +10,15 @@
 #include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
-#include <thread>
 
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/median.h"
+#include "core/parallel.h"
+#include "core/print.h"
 #include "core/rig.h"
 #include "tracker/detector.h"
 #include "tracker/marker_pose.h"
@@ -186,7 +188,7 @@ nlohmann::json json_of(const Marker& marker) {
   return node;
 }
 
-std::string json_text(const std::vector<DetectOutcome>& outcomes) {
+std::string outcomes_json(const std::vector<DetectOutcome>& outcomes) {
   nlohmann::json images = nlohmann::json::array();
   for (const DetectOutcome& outcome : outcomes) {
     if (!outcome.problem.empty()) continue;
@@ -197,7 +199,7 @@ std::string json_text(const std::vector<DetectOutcome>& outcomes) {
     for (const Marker& marker : outcome.markers) node["markers"].push_back(json_of(marker));
     images.push_back(node);
   }
-  return nlohmann::json{{"images", images}}.dump(1) + "\n";
+  return json_text(nlohmann::json{{"images", images}}, 1) + "\n";
 }
 
 std::string csv_text(const std::vector<DetectOutcome>& outcomes, bool with_family) {
@@ -215,17 +217,17 @@ std::string csv_text(const std::vector<DetectOutcome>& outcomes, bool with_famil
 
 void print(const DetectOutcome& outcome) {
   const std::string time = outcome.ms ? fmt::format(", {:.3f} ms", *outcome.ms) : "";
-  fmt::print("{}: {} markers{}\n", outcome.path.string(), outcome.markers.size(), time);
+  print_out("{}: {} markers{}\n", outcome.path.string(), outcome.markers.size(), time);
   for (const Marker& marker : outcome.markers) {
     const Eigen::Vector2d& px = marker.detection.corners_px[0];
-    fmt::print("  {:<24} ({:8.2f}, {:8.2f})  score {:.2f}", marker.detection.marker.text(), px.x(), px.y(),
-               marker.detection.score);
+    print_out("  {:<24} ({:8.2f}, {:8.2f})  score {:.2f}", marker.detection.marker.text(), px.x(), px.y(),
+              marker.detection.score);
     if (!marker.poses.empty()) {
       const Eigen::Vector3d t = 1e3 * marker.poses[0].camera_from_marker.translation;
-      fmt::print("  at ({:.1f}, {:.1f}, {:.1f}) mm, {:.3f} px", t.x(), t.y(), t.z(), marker.poses[0].rms_px);
-      if (marker.poses.size() > 1) fmt::print(", weight {:.2f}", marker.poses[0].weight);
+      print_out("  at ({:.1f}, {:.1f}, {:.1f}) mm, {:.3f} px", t.x(), t.y(), t.z(), marker.poses[0].rms_px);
+      if (marker.poses.size() > 1) print_out(", weight {:.2f}", marker.poses[0].weight);
     }
-    fmt::print("\n");
+    print_out("\n");
   }
 }
 
@@ -282,10 +284,7 @@ void detect_all(const DetectOptions& options,
       progress.step(++done);
     }
   };
-  std::vector<std::thread> others;
-  for (int i = 1; i < threads; ++i) others.emplace_back(work);
-  work();
-  for (std::thread& thread : others) thread.join();
+  run_on_threads(threads, work);
 }
 
 Status check_options(const DetectOptions& options) {
@@ -324,7 +323,7 @@ Status run_detect(const DetectOptions& options) {
   }
   const bool with_family = std::set(options.families.begin(), options.families.end()).size() > 1;
   if (!options.csv.empty()) LIMN_TRY_STATUS(write_file(options.csv, csv_text(outcomes, with_family)));
-  if (!options.json.empty()) LIMN_TRY_STATUS(write_file(options.json, json_text(outcomes)));
+  if (!options.json.empty()) LIMN_TRY_STATUS(write_file(options.json, outcomes_json(outcomes)));
   if (failed > 0) return error("{} of {} images could not be processed.", failed, outcomes.size());
   return {};
 }

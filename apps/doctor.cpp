@@ -13,7 +13,9 @@
 #include <thread>
 
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "device/devices_file.h"
 #include "device/gige_camera.h"
 #include "device/gl_context.h"
@@ -265,8 +267,8 @@ const char* word(State state) {
 
 void print_lines(const Findings& findings) {
   for (const Finding& finding : findings) {
-    fmt::print("{:<9}{:<10}{:<14} {}\n", word(finding.state), finding.area, finding.name, finding.text);
-    if (!finding.advice.empty()) fmt::print("{:<34}-> {}\n", "", finding.advice);
+    print_out("{:<9}{:<10}{:<14} {}\n", word(finding.state), finding.area, finding.name, finding.text);
+    if (!finding.advice.empty()) print_out("{:<34}-> {}\n", "", finding.advice);
   }
 }
 
@@ -281,7 +283,7 @@ void print_json(const Findings& findings) {
                                                         {"text", finding.text},
                                                         {"advice", finding.advice}});
   }
-  fmt::print("{}\n", report.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+  print_out("{}\n", json_text(report, 2));
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "device/gl_context.h"
 #include "exchange/projector_maps.h"
 #include "projector/renderer.h"
@@ -33,7 +35,7 @@ ordered_json report_of(const exchange::ExportJob& job) {
 
 void print(const ordered_json& report) {
   for (const auto& projector : report["projectors"]) {
-    fmt::print(
+    print_out(
         "{}: {}x{}, {:.1f} % of the pixels reach the prototype, {:.1f} % share it with other projectors{}\n",
         projector["name"].get<std::string>(), projector["size"][0].get<int>(),
         projector["size"][1].get<int>(), 100 * projector["lit_share"].get<double>(),
@@ -68,7 +70,7 @@ Status run_export(const exchange::ExportOptions& options, bool is_json) {
     if (exporter.is_asked_for(options)) LIMN_TRY_STATUS(exporter.write(job, options));
   const ordered_json report = report_of(job);
   if (is_json) {
-    fmt::print("{}\n", report.dump(2));
+    print_out("{}\n", json_text(report, 2));
   } else {
     print(report);
   }

@@ -5,7 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "core/rig.h"
 #include "exchange/mpcdi_reader.h"
 #include "exchange/mpcdi_report.h"
@@ -49,13 +51,13 @@ Status run_import(const ImportOptions& options) {
   for (const std::string& remark : mpcdi.remarks) log_warning("import: {}", remark);
   const ordered_json report = exchange::mpcdi_report(mpcdi);
   if (options.json) {
-    fmt::print("{}\n", report.dump(2));
+    print_out("{}\n", json_text(report, 2));
     return {};
   }
-  fmt::print("MPCDI {}, profile {}, {} region{}{}\n", mpcdi.version,
-             exchange::k_mpcdi_profiles.text(mpcdi.profile), mpcdi.regions.size(),
-             mpcdi.regions.size() == 1 ? "" : "s", mpcdi.made_by.empty() ? "" : ", made by " + mpcdi.made_by);
-  for (const auto& region : report["regions"]) fmt::print("{}\n", sentence_of(region));
+  print_out("MPCDI {}, profile {}, {} region{}{}\n", mpcdi.version,
+            exchange::k_mpcdi_profiles.text(mpcdi.profile), mpcdi.regions.size(),
+            mpcdi.regions.size() == 1 ? "" : "s", mpcdi.made_by.empty() ? "" : ", made by " + mpcdi.made_by);
+  for (const auto& region : report["regions"]) print_out("{}\n", sentence_of(region));
   return {};
 }
 

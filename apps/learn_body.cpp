@@ -8,7 +8,9 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/imager_file.h"
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "tracker/detector.h"
 #include "tracker/marker_mapping.h"
 
@@ -54,13 +56,13 @@ nlohmann::ordered_json json_of(const tracker::MarkerMap& learned, const std::str
 void print(const tracker::MarkerMap& learned) {
   for (const tracker::MappedMarker& marker : learned.markers) {
     const Eigen::Vector3d p_mm = 1e3 * marker.marker.body_from_marker.translation;
-    fmt::print("{:<24} at ({:.2f}, {:.2f}, {:.2f}) mm, +- {:.2f} mm, {:.2f} degrees, {} images\n",
-               marker.marker.marker.text(), p_mm.x(), p_mm.y(), p_mm.z(),
-               1e3 * std::sqrt(marker.covariance.bottomRightCorner<3, 3>().trace()),
-               k_degrees * std::sqrt(marker.covariance.topLeftCorner<3, 3>().trace()), marker.images);
+    print_out("{:<24} at ({:.2f}, {:.2f}, {:.2f}) mm, +- {:.2f} mm, {:.2f} degrees, {} images\n",
+              marker.marker.marker.text(), p_mm.x(), p_mm.y(), p_mm.z(),
+              1e3 * std::sqrt(marker.covariance.bottomRightCorner<3, 3>().trace()),
+              k_degrees * std::sqrt(marker.covariance.topLeftCorner<3, 3>().trace()), marker.images);
   }
-  fmt::print("{} markers from {} images, {:.3f} px; the body's frame is that of {}\n", learned.markers.size(),
-             learned.images, learned.rms_px, learned.frame.text());
+  print_out("{} markers from {} images, {:.3f} px; the body's frame is that of {}\n", learned.markers.size(),
+            learned.images, learned.rms_px, learned.frame.text());
   for (const MarkerName& marker : learned.unplaced)
     log_warning(
         "{}: no image shows it together with the others; it is left out. Add an image that shows it beside "
@@ -95,7 +97,7 @@ Status run_learn_body(const LearnBodyOptions& options) {
   const auto learned = tracker::map_markers(views, 1e-3 * options.size_mm);
   if (!learned) return error("--learn-body: {}", learned.message());
   print(*learned);
-  return write_file(options.out, json_of(*learned, options.out.stem().string()).dump(1) + "\n");
+  return write_file(options.out, json_text(json_of(*learned, options.out.stem().string()), 1) + "\n");
 }
 
 }  // namespace limn::apps

@@ -39,9 +39,17 @@ namespace fs = std::filesystem;
 
 constexpr double k_camera_limit_s = 0.5;  // short, so that the session ends in under a second
 
-// Set by SIGINT and SIGTERM.
+// Set by the signals that end a session.
 std::atomic<bool> g_is_ended = false;
 void end_session(int) { g_is_ended = true; }
+
+void end_session_on_signals() {
+  g_is_ended = false;
+  std::signal(SIGINT, end_session);
+  std::signal(SIGTERM, end_session);
+  // The terminal was closed. With nohup this signal is ignored, and stays so.
+  if (std::signal(SIGHUP, end_session) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
+}
 
 Status check_options(const LiveOptions& options) {
   if (!(options.seconds >= 0) || options.seconds > 1e6)
@@ -166,7 +174,7 @@ Status run_session(const LiveOptions& options,
   std::optional<device::GlContext> context;
   LIMN_TRY(context, device::GlContext::create());
   log_info("live: {}", context->description());
-  LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to));
+  LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to, options.osc_from));
   LIMN_TRY(const std::unique_ptr<remote::Server> server, serve(options, setup));
   LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, options.record, &setup));
   session::report_skipped(skipped_variants, {}, &output.telemetry());
@@ -280,9 +288,7 @@ Status play_with_devices(const LiveOptions& options) {
 
 Status run_live(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_options(options));
-  g_is_ended = false;
-  std::signal(SIGINT, end_session);
-  std::signal(SIGTERM, end_session);
+  end_session_on_signals();
   return options.devices.empty() ? play_in_virtual_room(options) : play_with_devices(options);
 }
 

@@ -4,6 +4,7 @@
 
 #include <string>
 
+#include "core/print.h"
 #include "exchange/printing/marker_mount.h"
 #include "exchange/printing/marker_sheet.h"
 #include "exchange/printing/marker_templates.h"
@@ -27,13 +28,13 @@ Status run_markers(const MarkersOptions& options) {
                        options.out.string());
   if (for_board) {
     LIMN_TRY(const std::string board, exchange::write_board_sheet(options.board, options.out));
-    fmt::print("{} in {}\n", board, options.out.string());
+    print_out("{} in {}\n", board, options.out.string());
     return {};
   }
   LIMN_TRY(const exchange::MarkerSheet sheet,
            exchange::write_marker_sheet({options.family, options.ids, options.size_mm, options.out}));
-  fmt::print("{} markers on {} page{} in {}\n", sheet.markers, sheet.pages, sheet.pages == 1 ? "" : "s",
-             options.out.string());
+  print_out("{} markers on {} page{} in {}\n", sheet.markers, sheet.pages, sheet.pages == 1 ? "" : "s",
+            options.out.string());
   return {};
 }
 

@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "wizard/measure/pixel_size.h"
 
 namespace limn::apps {
@@ -28,7 +29,7 @@ Status write_response(const PatternsOptions& options, const wizard::PixelSize& s
   LIMN_TRY_STATUS(write_images(options.out, count,
                                [&](int i) { return calib::draw_response(i, size.width, size.height); }));
   LIMN_TRY_STATUS(calib::save_response_patterns(size.width, size.height, options.out / "patterns.json"));
-  fmt::print("{} response images of {}x{} in {}\n", count, size.width, size.height, options.out.string());
+  print_out("{} response images of {}x{} in {}\n", count, size.width, size.height, options.out.string());
   return {};
 }
 
@@ -58,7 +59,7 @@ Status run_patterns(const PatternsOptions& options) {
   LIMN_TRY(const calib::Patterns patterns, by_response(options, *plain));
   LIMN_TRY_STATUS(write_images(options.out, patterns.count(), [&](int i) { return patterns.image(i); }));
   LIMN_TRY_STATUS(calib::save_patterns(patterns, options.out / "patterns.json"));
-  fmt::print("{} images of {}x{} in {}\n", patterns.count(), size.width, size.height, options.out.string());
+  print_out("{} images of {}x{} in {}\n", patterns.count(), size.width, size.height, options.out.string());
   return {};
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/file.h"
+#include "core/print.h"
 #include "design/design_report.h"
 #include "design/plan_page.h"
 #include "design/rig_design.h"
@@ -16,9 +17,9 @@ Status run_plan_rig(const PlanRigOptions& options) {
     return error("{}: this rig cannot be calibrated: {}", options.described.string(),
                  predicted_accuracy.message());
   if (options.json) {
-    fmt::print("{}\n", design::design_json(*predicted_accuracy));
+    print_out("{}\n", design::design_json(*predicted_accuracy));
   } else {
-    fmt::print("{}", design::design_table(*predicted_accuracy, described));
+    print_out("{}", design::design_table(*predicted_accuracy, described));
   }
   if (!options.out.empty()) {
     LIMN_TRY_STATUS(make_folder(options.out));

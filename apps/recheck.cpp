@@ -9,6 +9,7 @@
 #include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/image_writer.h"
+#include "core/print.h"
 #include "core/rig.h"
 #include "device/desktop.h"
 #include "device/devices_file.h"
@@ -93,21 +94,21 @@ Status write_rig(const calib::RigCheck& result, const RecheckCommand& command) {
 
 void print_table(const wizard::Rechecked& checked) {
   const calib::RigCheck& result = checked.result;
-  fmt::print("{:<14} {:>12} {:>10} {:>10}\n", "device", "observations", "before px", "after px");
+  print_out("{:<14} {:>12} {:>10} {:>10}\n", "device", "observations", "before px", "after px");
   for (const calib::CheckedDevice& device : result.devices) {
     if (device.observations == 0)
-      fmt::print("{:<14} {:>12}\n", device.name, "not seen");
+      print_out("{:<14} {:>12}\n", device.name, "not seen");
     else
-      fmt::print("{:<14} {:>12} {:>10.3f} {:>10.3f}\n", device.name, device.observations, device.before_px,
-                 device.after_px);
+      print_out("{:<14} {:>12} {:>10.3f} {:>10.3f}\n", device.name, device.observations, device.before_px,
+                device.after_px);
   }
   for (const calib::Move& move : result.candidates)
-    fmt::print("{}: turned {:.3f} ± {:.3f}°, moved {:.2f} ± {:.2f} mm: {:.2f} px, {:.2f} mm on the board\n",
-               move.device, move.degrees, move.degrees_stddev, move.mm, move.mm_stddev, move.px,
-               move.mm_on_board);
-  if (result.board_moved) fmt::print("the board has been moved: --still is not used\n");
-  fmt::print("{} ({} images, {:.1f} s at {:.0f} per second)\n", wizard::recheck_sentence(result),
-             checked.images, checked.images / k_images_a_second, k_images_a_second);
+    print_out("{}: turned {:.3f} ± {:.3f}°, moved {:.2f} ± {:.2f} mm: {:.2f} px, {:.2f} mm on the board\n",
+              move.device, move.degrees, move.degrees_stddev, move.mm, move.mm_stddev, move.px,
+              move.mm_on_board);
+  if (result.board_moved) print_out("the board has been moved: --still is not used\n");
+  print_out("{} ({} images, {:.1f} s at {:.0f} per second)\n", wizard::recheck_sentence(result),
+            checked.images, checked.images / k_images_a_second, k_images_a_second);
 }
 
 Result<wizard::CheckedRig> check(const RecheckCommand& command) {
@@ -130,11 +131,11 @@ Result<wizard::Rechecked> recheck(const RecheckCommand& command) {
 Status run_recheck(const RecheckCommand& command) {
   LIMN_TRY(const wizard::CheckedRig checked, check(command));
   if (command.json)
-    fmt::print("{}", checked.json);
+    print_out("{}", checked.json);
   else
     print_table(checked.rechecked);
   LIMN_TRY_STATUS(wizard::check_explained(checked.rechecked.result));
-  if (!command.json) fmt::print("rig in {}\n", command.out.string());
+  if (!command.json) print_out("rig in {}\n", command.out.string());
   return {};
 }
 

@@ -12,8 +12,10 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/print.h"
 #include "core/rig.h"
 #include "device/gl_context.h"
 #include "projector/renderer.h"
@@ -132,8 +134,8 @@ Result<scene::PosedScene> place(const RenderOptions& options,
   if (!options.poses.empty()) return scene::load_poses(options.poses, scene);
   LIMN_TRY(const std::vector<Track> tracks, find_bodies(scene, rig, frames));
   for (const Track& track : tracks) {
-    fmt::print("{}: {} marker{}, {:.2f} px\n", track.body, track.marker_count,
-               track.marker_count == 1 ? "" : "s", track.rms_px);
+    print_out("{}: {} marker{}, {:.2f} px\n", track.body, track.marker_count,
+              track.marker_count == 1 ? "" : "s", track.rms_px);
   }
   return scene::posed(scene, tracks);
 }
@@ -173,8 +175,8 @@ Result<Imager> viewer_of_files(std::span<const std::filesystem::path> files,
   }
   const scene::SharedViewpoint shared = scene::updated_viewpoint({}, eyes, *p_middle, 0);
   for (const scene::SharedViewpoint::Share& share : shared.shares)
-    fmt::print("{}: {:.0f} % of the shared viewpoint{}\n", share.viewer, 100 * share.share,
-               share.viewer == shared.leader ? ", leads" : "");
+    print_out("{}: {:.0f} % of the shared viewpoint{}\n", share.viewer, 100 * share.share,
+              share.viewer == shared.leader ? ", leads" : "");
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, posed, d_up_world);
   if (!viewer)
     return error(
@@ -219,10 +221,10 @@ Status write_coverage(const std::vector<projector::PartCoverage>& parts,
                              {"off_surface", part.off_surface_share},
                              {"mask", mask}});
     LIMN_TRY_STATUS(write_png(out / mask, part.mask));
-    fmt::print("{} ({}): {} viewer pixels, {:.1f} % by light, {:.1f} % on the screen\n", part.slot,
-               part.variant, part.viewer_pixels, 100 * part.on_surface_share, 100 * part.off_surface_share);
+    print_out("{} ({}): {} viewer pixels, {:.1f} % by light, {:.1f} % on the screen\n", part.slot,
+              part.variant, part.viewer_pixels, 100 * part.on_surface_share, 100 * part.off_surface_share);
   }
-  return write_file(out / "coverage.json", json.dump(2) + "\n");
+  return write_file(out / "coverage.json", json_text(json, 2) + "\n");
 }
 
 // The image without lens distortion: the same focal length, the principal point in the middle.

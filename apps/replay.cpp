@@ -203,7 +203,7 @@ class Recording final : public session::FrameClock, public session::FrameSource 
 
   void wait_for(Stamp shown_at) {
     if (options_.step) {
-      fmt::print(stderr, "{:.3f} s; press enter for the next image\n", seconds_of(shown_at));
+      log_info("{:.3f} s; press enter for the next image", seconds_of(shown_at));
       std::string line;
       std::getline(std::cin, line);
       return;

@@ -5,6 +5,7 @@
 #include "calib/capture_set.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/print.h"
 #include "core/rig.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
@@ -59,12 +60,12 @@ Status run_scan(const ScanCommand& command) {
   for (const std::string& warning : scan.warnings) log_warning("scan: {}", warning);
   if (command.json) {
     LIMN_TRY(const std::string json, read_file(command.out / "scan.json"));
-    fmt::print("{}", json);
+    print_out("{}", json);
     return {};
   }
-  fmt::print("{} points, standard deviation {:.3f} mm (median); mesh of {} triangles; in {}\n",
-             scan.points.positions.size(), wizard::stddev_mm(scan, 0.5), scan.mesh.triangles.size(),
-             command.out.string());
+  print_out("{} points, standard deviation {:.3f} mm (median); mesh of {} triangles; in {}\n",
+            scan.points.positions.size(), wizard::stddev_mm(scan, 0.5), scan.mesh.triangles.size(),
+            command.out.string());
   return {};
 }
 

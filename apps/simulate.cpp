@@ -8,8 +8,10 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/print.h"
 #include "core/rig.h"
 #include "sim/sensor_model.h"
 #include "sim/truth.h"
@@ -103,7 +105,7 @@ Status write_truth(const sim::World& world, const scene::PosedScene& parts, cons
   for (const sim::PlacedMarker& marker : world.markers)
     json["markers"].push_back(marker_json(world, truth, marker));
   LIMN_TRY_STATUS(save_rig(world.rig, out / "rig"));
-  return write_file(out / "truth.json", json.dump(2) + "\n");
+  return write_file(out / "truth.json", json_text(json, 2) + "\n");
 }
 
 // What one camera sees. It numbers the photographs so that each has its own noise.
@@ -132,7 +134,7 @@ Status shoot(Shooting& shooting,
   const double shot_ms =
       1e3 * std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   LIMN_TRY_STATUS(write_png(file, image));
-  fmt::print("{}  {}x{}, photographed in {:.0f} ms\n", file.string(), image.cols, image.rows, shot_ms);
+  print_out("{}  {}x{}, photographed in {:.0f} ms\n", file.string(), image.cols, image.rows, shot_ms);
   return {};
 }
 

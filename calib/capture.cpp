@@ -4,6 +4,7 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 
 namespace limn::calib {
 namespace {
@@ -57,7 +58,7 @@ Status begin_captures(const CaptureSet& plan) {
                                        {"projectors", projectors},
                                        {"board", plan.board.text()},
                                        {"patterns", "patterns.json"}};
-  return write_file(path, json.dump(2) + "\n");
+  return write_file(path, json_text(json, 2) + "\n");
 }
 
 Status capture_pose(const CaptureSet& plan, int pose, const CaptureBackend& backend) {

@@ -2,11 +2,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <set>
-#include <thread>
+
+#include "core/parallel.h"
 
 namespace limn::calib {
 namespace {
@@ -92,15 +92,10 @@ std::vector<PoseScore> score_poses(const Observations& observations,
                                    bool with_errors,
                                    CrossValidation* into) {
   std::vector<PoseScore> scores(poses.size());
-  std::atomic<size_t> next = 0;
-  const auto work = [&] {
-    for (size_t i = next++; i < poses.size(); i = next++)
-      scores[i] = score_pose(observations, options, solution, poses[i], with_errors, into);
-  };
-  std::vector<std::jthread> threads;
-  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(work);
-  work();
-  threads.clear();
+  parallel_for(static_cast<int>(poses.size()), [&](int i) {
+    const auto at = static_cast<size_t>(i);
+    scores[at] = score_pose(observations, options, solution, poses[at], with_errors, into);
+  });
   return scores;
 }
 

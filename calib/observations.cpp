@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -11,14 +10,15 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
-#include <thread>
 
 #include "calib/tie_points.h"
 #include "core/file.h"
 #include "core/frame.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/median.h"
+#include "core/parallel.h"
 
 namespace limn::calib {
 namespace {
@@ -372,24 +372,17 @@ Result<Observed> observe(const CaptureSet& captures,
   // order.
   std::vector<std::optional<Result<Observed>>> parts(static_cast<size_t>(count));
   Progress progress("decode", count);
-  std::atomic<int> next = 0;
-  std::mutex telling;
+  std::mutex progress_mutex;
   int done = 0;
-  const auto work = [&] {
-    for (int i = next++; i < count; i = next++) {
-      if (should_continue && !should_continue()) {
-        parts[static_cast<size_t>(i)] = error("{}", k_ended);
-        continue;
-      }
-      parts[static_cast<size_t>(i)] = observe_pose(captures, i / cameras, i % cameras, options);
-      const std::lock_guard lock(telling);
-      progress.step(++done);
+  parallel_for(count, [&](int i) {
+    if (should_continue && !should_continue()) {
+      parts[static_cast<size_t>(i)] = error("{}", k_ended);
+      return;
     }
-  };
-  std::vector<std::thread> threads;
-  for (unsigned i = 1; i < std::thread::hardware_concurrency(); ++i) threads.emplace_back(work);
-  work();
-  for (std::thread& thread : threads) thread.join();
+    parts[static_cast<size_t>(i)] = observe_pose(captures, i / cameras, i % cameras, options);
+    const std::lock_guard lock(progress_mutex);
+    progress.step(++done);
+  });
   for (const auto& part : parts) {
     LIMN_TRY_STATUS(part->ok() ? Status() : Status(part->error()));
     append(**part, &observed);
@@ -457,7 +450,7 @@ Status save_observations(const Observations& observations, const std::filesystem
     json["points"].push_back({p.camera, p.pose, p.px_camera.x(), p.px_camera.y()});
   for (const TiePointObservation& s : observations.tie_observations)
     json["sightings"].push_back({s.point, s.by_projector ? 1 : 0, s.imager, s.px.x(), s.px.y(), s.stddev_px});
-  return write_file(path, json.dump() + "\n");
+  return write_file(path, json_text(json) + "\n");
 }
 
 Observations without_pose(const Observations& observations, int pose) {

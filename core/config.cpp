@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/names.h"
 
 namespace limn {
@@ -24,7 +25,7 @@ constexpr int k_max_depth = 100;  // Limn's files need 8; printing or freeing a 
 
 // The value as text, short enough for a message.
 std::string found(const Json& json) {
-  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  std::string text = json_text(json);
   if (text.size() > 60) text = text.substr(0, 57) + "...";
   return std::string(json.type_name()) + " " + text;
 }

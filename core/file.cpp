@@ -4,10 +4,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <vector>
 
 namespace limn {
 namespace {
@@ -31,6 +33,35 @@ int write_all(int fd, std::string_view content) {
     content.remove_prefix(static_cast<std::size_t>(written));
   }
   return 0;
+}
+
+// Moves every file of `fresh` to `folder`; what it replaces goes to `old`. If one cannot be moved, all are as
+// before.
+Status replace_files(const fs::path& fresh, const fs::path& folder, const fs::path& old) {
+  std::vector<fs::path> names;
+  for (const auto& entry : fs::directory_iterator(fresh)) names.push_back(entry.path().filename());
+  std::sort(names.begin(), names.end());
+  int code = 0;
+  std::size_t replaced = 0;
+  for (; replaced < names.size() && code == 0; ++replaced) {
+    const fs::path& name = names[replaced];
+    const bool had_old = ::rename((folder / name).c_str(), (old / name).c_str()) == 0;
+    if (!had_old && errno != ENOENT) code = errno;
+    if (code == 0 && ::rename((fresh / name).c_str(), (folder / name).c_str()) != 0) code = errno;
+  }
+  if (code == 0) return {};
+  const fs::path problem = folder / names[replaced - 1];
+  for (std::size_t i = 0; i < replaced; ++i) {
+    if (i + 1 < replaced) ::unlink((folder / names[i]).c_str());
+    if (fs::exists(old / names[i])) ::rename((old / names[i]).c_str(), (folder / names[i]).c_str());
+  }
+  return write_error(problem, code);
+}
+
+std::string with_all_replaced(std::string text, const std::string& what, const std::string& by) {
+  for (std::size_t at = 0; (at = text.find(what, at)) != std::string::npos; at += by.size())
+    text.replace(at, what.size(), by);
+  return text;
 }
 
 }  // namespace
@@ -60,6 +91,24 @@ Status write_file(const fs::path& path, std::string_view content) {
     return write_error(path, code);
   }
   return {};
+}
+
+Status write_together(const fs::path& folder, const std::function<Status(const fs::path& into)>& write) {
+  LIMN_TRY_STATUS(make_folder(folder));
+  std::string name = (folder / ".new.XXXXXX").string();
+  if (::mkdtemp(name.data()) == nullptr) return write_error(folder, errno);
+  const fs::path staging = name, fresh = staging / "new", old = staging / "old";
+  std::error_code ignored;
+  fs::create_directory(fresh, ignored);
+  fs::create_directory(old, ignored);
+  Status done = write(fresh);
+  if (done)
+    done = replace_files(fresh, folder, old);
+  else
+    done =
+        Error{with_all_replaced(done.message(), fresh.string(), folder.string()), done.error().wrong_usage};
+  fs::remove_all(staging, ignored);
+  return done;
 }
 
 Status append_file(const fs::path& path, std::string_view content) {

@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/image_io.h"
+#include "core/utf8.h"
 
 namespace limn {
 namespace {
@@ -53,7 +54,7 @@ std::string row_html(std::span<const HtmlCell> cells, const char* tag) {
 
 std::string escaped(const std::string& text) {
   std::string html;
-  for (const char c : text) {
+  for (const char c : as_utf8(text)) {
     switch (c) {
       case '<':
         html += "&lt;";

@@ -10,7 +10,8 @@ namespace limn {
 /// Pieces of HTML pages that are one file: no scripts, no addresses of other files. Parameters named `html`
 /// are inserted as they are; all other texts are escaped here.
 
-/// `text` with <, >, & and quotes escaped, for HTML and XML, also inside attributes.
+/// `text` with <, >, & and quotes escaped, for HTML and XML, also inside attributes. Bytes that are not UTF-8
+/// become U+FFFD.
 std::string escaped(const std::string& text);
 
 /// Which colours a page has: those of the reader's system, or always the same.

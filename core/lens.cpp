@@ -9,7 +9,8 @@ extern "C" {
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <thread>
+
+#include "core/parallel.h"
 
 namespace limn {
 
@@ -225,21 +226,15 @@ std::vector<Eigen::Vector3f> direction_map(const Lens& lens, int width, int heig
   const int columns = (width + step - 1) / step;
   const int rows = (height + step - 1) / step;
   std::vector<Eigen::Vector3f> directions(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-  const auto fill_rows = [&](int begin, int stride) {
+  parallel_for(rows, [&](int row) {
     const float nan = std::numeric_limits<float>::quiet_NaN();
-    for (int row = begin; row < rows; row += stride) {
-      for (int column = 0; column < columns; ++column) {
-        const auto d = lens.unproject(Eigen::Vector2d(column, row) * step);
-        directions[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
-                   static_cast<std::size_t>(column)] =
-            d ? Eigen::Vector3f(d->cast<float>()) : Eigen::Vector3f(nan, nan, nan);
-      }
+    for (int column = 0; column < columns; ++column) {
+      const auto d = lens.unproject(Eigen::Vector2d(column, row) * step);
+      directions[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                 static_cast<std::size_t>(column)] =
+          d ? Eigen::Vector3f(d->cast<float>()) : Eigen::Vector3f(nan, nan, nan);
     }
-  };
-  const int thread_count = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  std::vector<std::jthread> threads;
-  for (int i = 0; i < thread_count; ++i) threads.emplace_back(fill_rows, i, thread_count);
-  threads.clear();
+  });
   return directions;
 }
 

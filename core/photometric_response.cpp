@@ -9,6 +9,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 
 namespace limn {
 namespace {
@@ -229,7 +230,7 @@ Status save_responses(const RigResponses& responses,
     for (const auto& [name, map] : maps_of(mixing))
       LIMN_TRY_STATUS(write_png(folder / map_file(mixing, name), stored_map(*map)));
   }
-  return write_file(folder / "response.json", json.dump(1) + "\n");
+  return write_file(folder / "response.json", json_text(json, 1) + "\n");
 }
 
 Result<ColourMixing> load_mixing(const fs::path& response_json,

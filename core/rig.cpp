@@ -6,6 +6,7 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 
 namespace limn {
 namespace {
@@ -85,8 +86,8 @@ Result<Rig> load_rig_json(const fs::path& path) {
   rig.cameras = read_imagers(root, "cameras", &names);
   rig.projectors = read_imagers(root, "projectors", &names);
   rig.focuses = read_focuses(root);
-  if (const auto node = root.find("covariance")) rig.covariance_json = node->json().dump();
-  if (const auto node = root.find("provenance")) rig.provenance_json = node->json().dump();
+  if (const auto node = root.find("covariance")) rig.covariance_json = json_text(node->json());
+  if (const auto node = root.find("provenance")) rig.provenance_json = json_text(node->json());
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY_STATUS(add_responses(config.folder(), &rig));
   return rig;
@@ -141,7 +142,6 @@ Result<Rig> load_rig(const fs::path& path) {
 }
 
 Status save_rig(const Rig& rig, const fs::path& folder) {
-  LIMN_TRY_STATUS(make_folder(folder));
   OrderedJson json = {
       {"schema", "limn.rig/1"}, {"cameras", OrderedJson::array()}, {"projectors", OrderedJson::array()}};
   for (const Imager& camera : rig.cameras) json["cameras"].push_back(json_of(camera));
@@ -154,12 +154,14 @@ Status save_rig(const Rig& rig, const fs::path& folder) {
   }
   if (!rig.covariance_json.empty()) json["covariance"] = OrderedJson::parse(rig.covariance_json);
   if (!rig.provenance_json.empty()) json["provenance"] = OrderedJson::parse(rig.provenance_json);
-  for (const auto* imagers : {&rig.cameras, &rig.projectors}) {
-    for (const Imager& imager : *imagers) {
-      LIMN_TRY_STATUS(save_cameramodel(imager, folder / (imager.name + ".cameramodel")));
+  return write_together(folder, [&](const fs::path& into) -> Status {
+    for (const auto* imagers : {&rig.cameras, &rig.projectors}) {
+      for (const Imager& imager : *imagers) {
+        LIMN_TRY_STATUS(save_cameramodel(imager, into / (imager.name + ".cameramodel")));
+      }
     }
-  }
-  return write_file(folder / "rig.json", json.dump(2) + "\n");
+    return write_file(into / "rig.json", json_text(json, 2) + "\n");
+  });
 }
 
 }  // namespace limn

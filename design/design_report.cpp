@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/json_text.h"
+
 namespace limn::design {
 namespace {
 
@@ -59,7 +61,7 @@ nlohmann::ordered_json json_of(const PredictedAccuracy& predicted_accuracy) {
 }  // namespace
 
 std::string design_json(const PredictedAccuracy& predicted_accuracy) {
-  return json_of(predicted_accuracy).dump(2);
+  return json_text(json_of(predicted_accuracy), 2);
 }
 
 std::string design_table(const PredictedAccuracy& predicted_accuracy, const DescribedRig& described) {

@@ -5,7 +5,9 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/time_now.h"
+#include "core/utf8.h"
 
 namespace limn::scene {
 namespace {
@@ -14,11 +16,7 @@ namespace {
 bool is_text(const std::string& text) {
   const auto is_control = [](unsigned char c) { return (c < 0x20 && c != '\n') || c == 0x7f; };
   if (std::any_of(text.begin(), text.end(), is_control)) return false;
-  try {
-    return !nlohmann::json(text).dump().empty();
-  } catch (const nlohmann::json::exception&) {  // not UTF-8
-    return false;
-  }
+  return is_utf8(text);
 }
 
 Status check(const Comment& comment) {
@@ -72,7 +70,7 @@ Status save_comments(const std::filesystem::path& path, const std::vector<Commen
                    {"slot", comment.slot},
                    {"text", comment.text}});
   return write_file(
-      path, nlohmann::ordered_json({{"schema", "limn.comments/1"}, {"comments", all}}).dump(2) + "\n");
+      path, json_text(nlohmann::ordered_json({{"schema", "limn.comments/1"}, {"comments", all}}), 2) + "\n");
 }
 
 }  // namespace limn::scene

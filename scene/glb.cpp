@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "core/json_text.h"
+
 namespace limn::scene {
 namespace {
 
@@ -174,7 +176,7 @@ struct Document {
       for (std::size_t i = 0; i < images.size(); ++i) json["textures"].push_back({{"source", i}});
     }
     const std::string body =
-        chunk("JSON", json.dump(), ' ') + chunk(std::string("BIN\0", 4).data(), bytes, '\0');
+        chunk("JSON", json_text(json), ' ') + chunk(std::string("BIN\0", 4).data(), bytes, '\0');
     std::string head = "glTF";
     append(head, std::uint32_t{2});
     append(head, static_cast<std::uint32_t>(12 + body.size()));

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "core/json_text.h"
 
 namespace limn::scene {
 namespace {
@@ -40,7 +41,7 @@ std::string marker_file_json(std::span<const BodyMarker> markers) {
     all.push_back({{"name", marker.marker.text()},
                    {"size_mm", 1e3 * marker.size_m},
                    {"prototype_from_marker", to_json(marker.body_from_marker)}});
-  return nlohmann::ordered_json({{"schema", k_markers}, {"markers", all}}).dump(2) + "\n";
+  return json_text(nlohmann::ordered_json({{"schema", k_markers}, {"markers", all}}), 2) + "\n";
 }
 
 }  // namespace limn::scene

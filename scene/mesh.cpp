@@ -11,8 +11,11 @@
 #include <assimp/LogStream.hpp>
 #include <cctype>
 #include <cmath>
+#include <fstream>
+#include <sstream>
 
 #include "core/log.h"
+#include "scene/mesh_trial.h"
 #include "scene/read_materials.h"
 #include "scene/tangents.h"
 
@@ -269,6 +272,27 @@ class Complaints {
   Stream stream_;
 };
 
+// On a PLY file whose header has no end assimp searches for ever.
+Status check_ply_header(const fs::path& path) {
+  constexpr int k_most_lines = 10000;
+  std::error_code ignored;
+  const auto bytes = fs::file_size(path, ignored);
+  std::ifstream in(path, std::ios::binary);
+  std::string line, word, name;
+  for (int i = 0; i < k_most_lines && std::getline(in, line); ++i) {
+    if (line.ends_with('\r')) line.pop_back();
+    if (i == 0 && line != "ply") break;
+    if (line == "end_header") return {};
+    std::uintmax_t count = 0;
+    if (std::istringstream(line) >> word >> name >> count && word == "element" && count > bytes)
+      return error(
+          "{}: expected a whole ply mesh, found {} bytes that are to hold {} elements '{}'. Export it again.",
+          path.string(), bytes, count, name);
+  }
+  return error("{}: expected a whole ply mesh, found no header from 'ply' to 'end_header'. Export it again.",
+               path.string());
+}
+
 }  // namespace
 
 double metres_per_unit(LengthUnit units) {
@@ -292,11 +316,14 @@ Result<Mesh> load_mesh(const fs::path& path, LengthUnit units) {
   if (std::error_code code; !fs::is_regular_file(path, code)) {
     return error("{}: expected a mesh file, found no file. Check the name.", path.string());
   }
+  if (extension(path) == ".ply") {
+    LIMN_TRY_STATUS(check_ply_header(path));
+  }
+  LIMN_TRY_STATUS(try_mesh_reader(path));
   Assimp::Importer importer;
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   Complaints complaints;
-  const aiScene* scene = importer.ReadFile(
-      path.string(), aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
+  const aiScene* scene = importer.ReadFile(path.string(), k_mesh_reader_steps);
   if (complaints.text().find("out-of-range indices") != std::string::npos) {
     return error(
         "{}: expected triangles of the mesh's own vertices, found indices beyond their number. Export it "

@@ -10,8 +10,10 @@
 
 #include "core/config.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/names.h"
+#include "core/utf8.h"
 #include "scene/actions.h"
 #include "scene/marker_file.h"
 
@@ -323,6 +325,9 @@ Result<Variant> auto_import_meshes(const fs::path& file,
                                    const Slot& slot,
                                    const std::map<std::string, LengthUnit>& known_units) {
   const std::string name = file.stem().string();
+  if (!is_utf8(name))
+    return error("{}: expected a file name in UTF-8, found other bytes. Rename the file.",
+                 as_utf8(file.string()));
   if (find_named(slot.variants, name))
     return error(
         "{}: expected a file name that no other variant of slot '{}' has, found '{}' twice. Rename the file.",
@@ -369,7 +374,7 @@ Status load_variants(std::span<const MeshFile> listed,
     if (variant)
       variants.push_back(std::move(*variant));
     else
-      LIMN_TRY_STATUS(leave_out(file.stem().string(), variant.error()));
+      LIMN_TRY_STATUS(leave_out(as_utf8(file.stem().string()), variant.error()));
   }
   slot->variants = std::move(variants);
   return {};
@@ -449,7 +454,7 @@ std::string units_json(const Slot& slot, const std::string& variant, LengthUnit 
     if (known.auto_imported && !known.auto_imported->is_guess)
       all[known.name] = to_text(known.auto_imported->units);
   all[variant] = to_text(units);
-  return nlohmann::ordered_json({{"schema", "limn.units/1"}, {"units", all}}).dump(2) + "\n";
+  return json_text(nlohmann::ordered_json({{"schema", "limn.units/1"}, {"units", all}}), 2) + "\n";
 }
 
 Result<Imager> load_viewer(const fs::path& path) {

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/config.h"
+#include "core/json_text.h"
 #include "core/names.h"
 #include "scene/actions.h"
 #include "scene/command_text.h"
@@ -157,7 +158,7 @@ std::string pairings_json(const Scene& scene, const ShowState& show_state) {
   for (std::size_t i = 0; i < scene.slots.size(); ++i)
     if (show_state.slots[i].marker) slots[scene.slots[i].name] = show_state.slots[i].marker->text();
   if (slots.empty()) return {};
-  return nlohmann::ordered_json({{"schema", "limn.pairings/1"}, {"slots", slots}}).dump(2) + "\n";
+  return json_text(nlohmann::ordered_json({{"schema", "limn.pairings/1"}, {"slots", slots}}), 2) + "\n";
 }
 
 Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& scene, ShowState show_state) {
@@ -241,7 +242,7 @@ std::string look_json(const Look& look) {
     if (!part.material.is_none()) slot["material"] = to_json(part.material);
   }
   if (look.light) json["light"] = to_json(*look.light);
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {

@@ -8,6 +8,8 @@
 #include <memory>
 #include <optional>
 
+#include "core/utf8.h"
+
 namespace limn::session {
 namespace {
 
@@ -48,11 +50,10 @@ std::string arguments_of(const scene::Action& action) {
   return words.empty() ? "none" : fmt::format("{}", fmt::join(words, "; "));
 }
 
+// Whether the text is UTF-8 without control characters.
 bool is_printable(const std::string& text) {
-  return std::none_of(text.begin(), text.end(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return byte < 0x20 || byte == 0x7f;
-  });
+  const auto is_control = [](unsigned char byte) { return byte < 0x20 || byte == 0x7f; };
+  return is_utf8(text) && std::none_of(text.begin(), text.end(), is_control);
 }
 
 // The text as it may appear in a message to people.
@@ -126,7 +127,7 @@ struct Reader {
     const auto found = is_at_end() ? std::nullopt : arguments[next].text();
     if (!found) return error("{}: expected {} as text, found {}.", path, what, found_here());
     if (found->size() > k_longest_text || !is_printable(*found))
-      return error("{}: expected {} of at most {} printable bytes, found {} bytes.", path, what,
+      return error("{}: expected {} of at most {} printable bytes of UTF-8, found {} bytes.", path, what,
                    k_longest_text, found->size());
     ++next;
     return *found;

@@ -35,11 +35,18 @@ bool is_same(const std::vector<OscValue>& a, const std::vector<OscValue>& b) {
 
 }  // namespace
 
-Result<OscPort> OscPort::open(const std::string& receive_at, const std::string& send_to) {
+Result<OscPort> OscPort::open(const std::string& receive_at,
+                              const std::string& send_to,
+                              const std::string& from) {
   OscPort out;
   const auto named = [](const char* option, const Error& problem) {
     return Error{fmt::format("{}: {}", option, problem.message), problem.wrong_usage};
   };
+  if (!from.empty() && receive_at.empty())
+    return usage_error("--osc-from: expected --osc with it, found none.");
+  if (!from.empty() && !is_numeric_address(from))
+    return usage_error("--osc-from: expected a numeric address such as 192.168.7.20, found '{}'.", from);
+  out.from_ = from;
   if (!receive_at.empty()) {
     const auto place = net_place(receive_at, "127.0.0.1", true);
     if (!place) return named("--osc", place.error());
@@ -47,6 +54,11 @@ Result<OscPort> OscPort::open(const std::string& receive_at, const std::string& 
     if (!socket) return named("--osc", socket.error());
     out.input_ = std::move(*socket);
     log_info("live: receives OSC at {}, UDP port {}", place->host, out.port());
+    if (from.empty() && !is_loopback_address(place->host))
+      log_warning(
+          "live: OSC asks nobody for a PIN: every program that reaches {} can change the session. "
+          "--osc-from ADDRESS accepts one machine only.",
+          place->host);
   }
   if (!send_to.empty()) {
     const auto place = net_place(send_to, "127.0.0.1");
@@ -63,9 +75,15 @@ void OscPort::apply_edits(Session* session, Telemetry* telemetry, Stamp at) {
   std::array<std::uint8_t, k_longest_osc + 1> bytes;
   const Stamp begun = now();
   for (int i = 0; i < k_most_at_once && now() - begun < k_longest_receiving; ++i) {
-    const auto length = input_->next(bytes);
-    if (!length) break;
-    const auto edit = edit_of_osc({bytes.data(), std::min(*length, bytes.size())});
+    const auto datagram = input_->next(bytes);
+    if (!datagram) break;
+    if (!from_.empty() && datagram->from != from_) {
+      refuse(
+          fmt::format("expected messages of {} only (--osc-from), found one of {}.", from_, datagram->from),
+          telemetry, at);
+      continue;
+    }
+    const auto edit = edit_of_osc({bytes.data(), std::min(datagram->length, bytes.size())});
     const Status done = edit ? session->edit(*edit, "osc", at) : Status(edit.error());
     if (!done) refuse(done.message(), telemetry, at);
   }

@@ -20,8 +20,12 @@ namespace limn::session {
 class OscPort : public SessionClient {
  public:
   /// `receive_at`: PORT on the loopback interface, or ADDRESS:PORT; port 0: any free one. `send_to`:
-  /// HOST:PORT. An empty text: receives or sends nothing. Errors name the option.
-  static Result<OscPort> open(const std::string& receive_at, const std::string& send_to);
+  /// HOST:PORT. An empty text: receives or sends nothing. `from`: the only address whose messages are
+  /// accepted; empty: all are, and a warning says so if other machines can reach the port. Errors name the
+  /// option.
+  static Result<OscPort> open(const std::string& receive_at,
+                              const std::string& send_to,
+                              const std::string& from = "");
 
   /// Applies the edits of the messages that wait, at most k_most_at_once of them and for at most 5 ms; the
   /// others wait for the next call. Refused messages are reported at most once a second, with the number of
@@ -46,6 +50,7 @@ class OscPort : public SessionClient {
   void put(const std::string& key, const std::string& path, std::vector<OscValue> arguments);
 
   std::optional<UdpSocket> input_, output_;
+  std::string from_;  // the only accepted sender; empty: all
   std::optional<Stamp> refused_at_;
   std::size_t unreported_ = 0;  // refusals that were not reported yet
   std::map<std::string, std::vector<OscValue>> sent_;

@@ -6,6 +6,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "device/jpeg.h"
 
 namespace limn::session {
@@ -78,7 +79,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const
     return error(
         "{}: expected a file that can be written, found none. Check the permissions and the free disk space.",
         (folder / "events.jsonl").string());
-  LIMN_TRY_STATUS(write_file(folder / "session.json", setup_json(setup).dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_file(folder / "session.json", json_text(setup_json(setup), 2) + "\n"));
   return out;
 }
 
@@ -147,7 +148,7 @@ void Recorder::record_images(const ComposedFrame& composed, std::size_t moments)
 }
 
 void Recorder::write(const nlohmann::ordered_json& event) {
-  events_ << event.dump() << '\n';
+  events_ << json_text(event) << '\n';
   if (!events_.flush()) end("the disk is full");
 }
 

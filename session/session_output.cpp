@@ -4,7 +4,9 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 
 namespace limn::session {
 namespace {
@@ -12,10 +14,10 @@ namespace {
 void print_summary(const nlohmann::ordered_json& json) {
   for (const auto& [key, value] : json.items()) {
     if (value.is_object())
-      fmt::print("{}: median {:.3f}, 95 % {:.3f}, 99 % {:.3f}\n", key, value["median"].get<double>(),
-                 value["p95"].get<double>(), value["p99"].get<double>());
+      print_out("{}: median {:.3f}, 95 % {:.3f}, 99 % {:.3f}\n", key, value["median"].get<double>(),
+                value["p95"].get<double>(), value["p99"].get<double>());
     else if (value.is_number())
-      fmt::print("{}: {}\n", key, value.dump());
+      print_out("{}: {}\n", key, json_text(value));
   }
 }
 
@@ -77,7 +79,7 @@ Status SessionOutput::close(Session* session, bool as_json) {
   json.update(telemetry_.summary());
   const Status written = write_end(session, json);
   if (as_json)
-    fmt::print("{}\n", json.dump(2));
+    print_out("{}\n", json_text(json, 2));
   else
     print_summary(json);
   return written ? recorded : written;
@@ -92,7 +94,7 @@ Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& 
         write_png(out_ / ("projector-" + session->setup().rig.projectors[i].name + ".png"), images[i]));
   if (const cv::Mat screen = session->screen(); !screen.empty())
     LIMN_TRY_STATUS(write_png(out_ / "screen.png", screen));
-  LIMN_TRY_STATUS(write_file(out_ / "session.json", json.dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_file(out_ / "session.json", json_text(json, 2) + "\n"));
   return telemetry_.write_page(out_ / "session.html", "Limn session");
 }
 

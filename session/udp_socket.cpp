@@ -1,5 +1,6 @@
 #include "session/udp_socket.h"
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
@@ -10,10 +11,13 @@
 #include <charconv>
 #include <cstring>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 namespace limn::session {
 namespace {
+
+constexpr std::string_view k_ipv4_as_ipv6 = "::ffff:";
 
 struct FreeAddresses {
   void operator()(addrinfo* all) const { freeaddrinfo(all); }
@@ -59,6 +63,15 @@ Result<NetPlace> net_place(const std::string& text, const std::string& default_h
   return place;
 }
 
+bool is_numeric_address(const std::string& text) {
+  in6_addr address = {};
+  return inet_pton(AF_INET, text.c_str(), &address) == 1 || inet_pton(AF_INET6, text.c_str(), &address) == 1;
+}
+
+bool is_loopback_address(const std::string& text) {
+  return text.starts_with("127.") || text == "::1" || text.starts_with(fmt::format("{}127.", k_ipv4_as_ipv6));
+}
+
 Result<UdpSocket> UdpSocket::receiving(const NetPlace& place) {
   LIMN_TRY(const Addresses addresses, addresses_of(place, AI_NUMERICHOST | AI_PASSIVE));
   UdpSocket out(open_for(*addresses));
@@ -86,10 +99,17 @@ UdpSocket::~UdpSocket() {
   if (handle_ >= 0) close(handle_);
 }
 
-std::optional<std::size_t> UdpSocket::next(std::span<std::uint8_t> bytes) {
-  const ssize_t length = recv(handle_, bytes.data(), bytes.size(), MSG_TRUNC);
+std::optional<Datagram> UdpSocket::next(std::span<std::uint8_t> bytes) {
+  sockaddr_storage sender = {};
+  socklen_t size = sizeof sender;
+  auto* const address = reinterpret_cast<sockaddr*>(&sender);
+  const ssize_t length = recvfrom(handle_, bytes.data(), bytes.size(), MSG_TRUNC, address, &size);
   if (length < 0) return std::nullopt;
-  return static_cast<std::size_t>(length);
+  char host[NI_MAXHOST] = "";
+  static_cast<void>(getnameinfo(address, size, host, sizeof host, nullptr, 0, NI_NUMERICHOST));
+  const std::string_view from = host;
+  return Datagram{static_cast<std::size_t>(length),
+                  std::string(from.starts_with(k_ipv4_as_ipv6) ? from.substr(k_ipv4_as_ipv6.size()) : from)};
 }
 
 void UdpSocket::send(std::span<const std::uint8_t> bytes) {

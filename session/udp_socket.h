@@ -19,6 +19,16 @@ struct NetPlace {
 /// allowed too: any free port), or an empty host.
 Result<NetPlace> net_place(const std::string& text, const std::string& default_host, bool or_any = false);
 
+/// Whether it is a numeric IPv4 or IPv6 address; an IPv6 address stands without brackets.
+bool is_numeric_address(const std::string& text);
+/// Whether the numeric address can be reached by programs on this machine only.
+bool is_loopback_address(const std::string& text);
+
+struct Datagram {
+  std::size_t length = 0;  ///< The whole datagram's, also when it was cut off.
+  std::string from;        ///< The sender's numeric address, IPv4 where it has one.
+};
+
 /// A UDP socket that never waits.
 class UdpSocket {
  public:
@@ -31,9 +41,8 @@ class UdpSocket {
   UdpSocket& operator=(UdpSocket&& other) noexcept;
   ~UdpSocket();
 
-  /// Reads the next datagram into `bytes`, cut off where it is longer; returns its full length. nullopt: none
-  /// waits.
-  std::optional<std::size_t> next(std::span<std::uint8_t> bytes);
+  /// Reads the next datagram into `bytes`, cut off where it is longer. nullopt: none waits.
+  std::optional<Datagram> next(std::span<std::uint8_t> bytes);
   /// Sends a datagram. It is lost when nobody receives it or the network is busy.
   void send(std::span<const std::uint8_t> bytes);
   /// The port on which it receives.

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/json_text.h"
 #include "scene/glb.h"
 #include "scene/posed_scene.h"
 #include "sim/ray_scene.h"
@@ -517,7 +518,7 @@ std::map<std::string, std::string> car_door_files() {
   json["viewer"]["fixed"] = {{"world_from_viewer", pose_json(world_from_viewer())},
                              {"size", {k_viewer_size[0], k_viewer_size[1]}},
                              {"fov_deg", k_viewer_fov_deg}};
-  files["scene.json"] = json.dump(2) + "\n";
+  files["scene.json"] = json_text(json, 2) + "\n";
   return files;
 }
 

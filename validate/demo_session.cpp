@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "projector/renderer.h"
 #include "sim/sensor_model.h"
@@ -446,7 +447,7 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   LIMN_TRY(auto images,
            phases.time("render", [&] { return session_images(&session, &room, measured.places.front()); }));
   measured.seconds = phases.seconds();
-  return DemoResult{rows_of(measured), json_of(measured).dump(2) + "\n", std::move(images)};
+  return DemoResult{rows_of(measured), json_text(json_of(measured), 2) + "\n", std::move(images)};
 }
 
 }  // namespace limn::validate

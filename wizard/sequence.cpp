@@ -17,6 +17,7 @@
 #include "calib/solve.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "wizard/capture/capture_folder.h"
 #include "wizard/device_checks.h"
 #include "wizard/measure/solve_captures.h"
@@ -192,7 +193,7 @@ class Run {
         json["projectors"].push_back({{"name", captures_.projectors[i].name},
                                       {"latency_ms", 1e3 * checked.latency[i]->seconds},
                                       {"within_ms", 1e3 * checked.latency[i]->within_s}});
-    return write_file(captures_.folder / k_latency, json.dump(2) + "\n");
+    return write_file(captures_.folder / k_latency, json_text(json, 2) + "\n");
   }
 
   // Captures a pose, again from its first image each time that a person asks for it.
@@ -272,7 +273,7 @@ Status add_to_rig(const std::vector<std::pair<std::string, double>>& latency_s, 
       rig.provenance_json.empty() ? ordered_json::object() : ordered_json::parse(rig.provenance_json);
   for (const auto& [projector, seconds] : latency_s)
     provenance["display_latency_ms"][projector] = 1e3 * seconds;
-  rig.provenance_json = provenance.dump();
+  rig.provenance_json = json_text(provenance);
   return save_rig(rig, folder);
 }
 

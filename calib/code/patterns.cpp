@@ -9,6 +9,7 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/names.h"
 
 namespace limn::calib {
@@ -198,7 +199,7 @@ Status save_patterns(const Patterns& patterns, const std::filesystem::path& path
   }
   if (patterns.code == PatternCode::exclusive_or) json["base_stripe_px"] = patterns.options.base_stripe_px;
   if (!patterns.options.inverses) json["inverses"] = false;
-  return write_file(path, json.dump(2) + "\n");
+  return write_file(path, json_text(json, 2) + "\n");
 }
 
 CodeOptions read_code_options(const ConfigNode& node) {

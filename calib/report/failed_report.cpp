@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/json_text.h"
 
 namespace limn::calib {
 
@@ -16,7 +17,7 @@ Status write_failed_report(const std::string& failure,
   const nlohmann::ordered_json json = {
       {"schema", "limn.report/1"}, {"verdict", "reject"}, {"failure", failure}, {"faults", list}};
   LIMN_TRY_STATUS(make_folder(folder));
-  return write_file(folder / "report.json", json.dump(2) + "\n");
+  return write_file(folder / "report.json", json_text(json, 2) + "\n");
 }
 
 }  // namespace limn::calib

@@ -4,6 +4,7 @@
 
 #include "calib/report/rounded.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/rig.h"
 
 namespace limn::calib {
@@ -13,16 +14,16 @@ using Json = nlohmann::ordered_json;
 
 std::string provenance(const Report& report, const SolveOptions& options) {
   const Observations& observations = report.observed.observations;
-  return Json{{"made_by", "limn solve"},
-              {"board", observations.board.text()},
-              {"board_bend_mm",
-               {rounded(report.solution.bend_m.x() * 1e3), rounded(report.solution.bend_m.y() * 1e3)}},
-              {"poses", observations.poses},
-              {"corners", observations.corners.size()},
-              {"matches", observations.matches.size()},
-              {"lens_models", lens_models(observations, options)},
-              {"held_out_px", rounded(report.assessment.held_out.rms_px)}}
-      .dump();
+  return json_text(
+      Json{{"made_by", "limn solve"},
+           {"board", observations.board.text()},
+           {"board_bend_mm",
+            {rounded(report.solution.bend_m.x() * 1e3), rounded(report.solution.bend_m.y() * 1e3)}},
+           {"poses", observations.poses},
+           {"corners", observations.corners.size()},
+           {"matches", observations.matches.size()},
+           {"lens_models", lens_models(observations, options)},
+           {"held_out_px", rounded(report.assessment.held_out.rms_px)}});
 }
 
 }  // namespace
@@ -33,11 +34,12 @@ Status write_rig_folder(const Report& report,
   const std::string json = report_json(report), html = report_html(report);
   Rig rig = report.solution.rig;
   rig.provenance_json = provenance(report, options);
-  LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY_STATUS(save_rig(rig, folder));
-  LIMN_TRY_STATUS(save_observations(report.observed.observations, folder / "observations.json"));
-  LIMN_TRY_STATUS(write_file(folder / "report.html", html));
-  return write_file(folder / "report.json", json);
+  return write_together(folder, [&](const std::filesystem::path& into) -> Status {
+    LIMN_TRY_STATUS(save_rig(rig, into));
+    LIMN_TRY_STATUS(save_observations(report.observed.observations, into / "observations.json"));
+    LIMN_TRY_STATUS(write_file(into / "report.html", html));
+    return write_file(into / "report.json", json);
+  });
 }
 
 }  // namespace limn::calib

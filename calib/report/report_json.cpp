@@ -4,6 +4,7 @@
 
 #include "calib/report/report.h"
 #include "calib/report/rounded.h"
+#include "core/json_text.h"
 
 namespace limn::calib {
 namespace {
@@ -168,7 +169,7 @@ std::string report_json(const Report& report) {
                      {"moved", moved_json(since_last)},
                      {"history", history_json(report.history)},
                      {"seconds", seconds}};
-  return json.dump(2) + "\n";
+  return json_text(json, 2) + "\n";
 }
 
 }  // namespace limn::calib

@@ -7,6 +7,7 @@
 
 #include "calib/code/patterns.h"
 #include "core/file.h"
+#include "core/json_text.h"
 
 namespace limn::calib {
 namespace {
@@ -83,7 +84,7 @@ Status save_response_patterns(int width, int height, const std::filesystem::path
   for (size_t i = 0; i < response_images().size(); ++i)
     json["pictures"].push_back(
         {{"file", image_name(static_cast<int>(i))}, {"shows", response_images()[i].what()}});
-  return write_file(path, json.dump(1) + "\n");
+  return write_file(path, json_text(json, 1) + "\n");
 }
 
 }  // namespace limn::calib

@@ -10,7 +10,9 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/log.h"
+#include "core/print.h"
 
 namespace limn::exchange {
 namespace {
@@ -245,11 +247,11 @@ Status run_mount(const MountOptions& options) {
   json["holder_from_marker"] = to_json(mount.holder_from_marker);
   std::filesystem::path pose_file = options.out;
   pose_file.replace_extension(".json");
-  LIMN_TRY_STATUS(write_file(pose_file, json.dump(2) + "\n"));
-  fmt::print("holder of {:g} x {:g} x {:g} mm in {}; print it on its back, cut the paper to {:g} x {:g} mm\n",
-             rounded(mount.side_mm), rounded(mount.side_mm), rounded(mount.plate_mm + mount.guide_mm),
-             options.out.string(), rounded(mount.paper_side_mm), rounded(mount.paper_side_mm));
-  fmt::print("holder_from_marker (in {}): {}\n", pose_file.string(), json["holder_from_marker"].dump());
+  LIMN_TRY_STATUS(write_file(pose_file, json_text(json, 2) + "\n"));
+  print_out("holder of {:g} x {:g} x {:g} mm in {}; print it on its back, cut the paper to {:g} x {:g} mm\n",
+            rounded(mount.side_mm), rounded(mount.side_mm), rounded(mount.plate_mm + mount.guide_mm),
+            options.out.string(), rounded(mount.paper_side_mm), rounded(mount.paper_side_mm));
+  print_out("holder_from_marker (in {}): {}\n", pose_file.string(), json_text(json["holder_from_marker"]));
   return {};
 }
 

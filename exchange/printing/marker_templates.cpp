@@ -7,6 +7,8 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
+#include "core/print.h"
 #include "tracker/identify.h"
 #include "tracker/template_comparison.h"
 #include "tracker/template_training.h"
@@ -30,30 +32,30 @@ std::string_view name_of(Discriminability telling) {
 }
 
 void print_table(const std::vector<TemplateSimilarity>& pairs) {
-  fmt::print("{:<24} {:<24} {:>6} {:>12}  verdict\n", "template", "and", "turned", "correlation");
+  print_out("{:<24} {:<24} {:>6} {:>12}  verdict\n", "template", "and", "turned", "correlation");
   for (const TemplateSimilarity& pair : pairs)
-    fmt::print("{:<24} {:<24} {:>5}° {:>12.3f}  {}\n", pair.a, pair.a == pair.b ? "itself" : pair.b,
-               90 * pair.quarter_turns, pair.correlation, name_of(pair.telling));
+    print_out("{:<24} {:<24} {:>5}° {:>12.3f}  {}\n", pair.a, pair.a == pair.b ? "itself" : pair.b,
+              90 * pair.quarter_turns, pair.correlation, name_of(pair.telling));
 }
 
 void print_verdict(const TemplateSimilarity& worst) {
   const std::string who = worst.a == worst.b ? worst.a + " and itself turned" : worst.a + " and " + worst.b;
   switch (worst.telling) {
     case Discriminability::confused:
-      fmt::print("Worst: {}: confused, correlation above {:g}: change one of them.\n", who,
-                 1 - tracker::k_min_rotation_lead);
+      print_out("Worst: {}: confused, correlation above {:g}: change one of them.\n", who,
+                1 - tracker::k_min_rotation_lead);
       return;
     case Discriminability::alike:
-      fmt::print(
+      print_out(
           "Worst: {}: alike, correlation of {:g} or more: the detector may mistake one for the other.\n", who,
           tracker::k_min_correlation);
       return;
     case Discriminability::apart:
-      fmt::print("Worst: {}: apart; all can be distinguished.\n", who);
+      print_out("Worst: {}: apart; all can be distinguished.\n", who);
   }
 }
 
-std::string json_text(const std::vector<TemplateSimilarity>& pairs) {
+std::string similarities_json(const std::vector<TemplateSimilarity>& pairs) {
   nlohmann::json list = nlohmann::json::array();
   for (const TemplateSimilarity& pair : pairs)
     list.push_back({{"a", pair.a},
@@ -61,10 +63,10 @@ std::string json_text(const std::vector<TemplateSimilarity>& pairs) {
                     {"quarter_turns", pair.quarter_turns},
                     {"correlation", pair.correlation},
                     {"verdict", name_of(pair.telling)}});
-  return nlohmann::json{{"min_correlation", tracker::k_min_correlation},
-                        {"min_rotation_lead", tracker::k_min_rotation_lead},
-                        {"pairs", list}}
-             .dump(1) +
+  return json_text(nlohmann::json{{"min_correlation", tracker::k_min_correlation},
+                                  {"min_rotation_lead", tracker::k_min_rotation_lead},
+                                  {"pairs", list}},
+                   1) +
          "\n";
 }
 
@@ -77,8 +79,8 @@ Status train_template(const std::filesystem::path& image, const std::filesystem:
   const auto trained = tracker::train_template(pixels);
   if (!trained) return error("{}: {}", image.string(), trained.message());
   LIMN_TRY_STATUS(write_file(out, tracker::template_text(*trained)));
-  fmt::print("{}: the frame at ({:.0f}, {:.0f}), {:.0f} px wide\n", out.string(), trained->corners_px[0].x(),
-             trained->corners_px[0].y(), trained->side_px);
+  print_out("{}: the frame at ({:.0f}, {:.0f}), {:.0f} px wide\n", out.string(), trained->corners_px[0].x(),
+            trained->corners_px[0].y(), trained->side_px);
   return {};
 }
 
@@ -94,7 +96,7 @@ Status compare_templates(const std::vector<std::filesystem::path>& files, const 
   const auto pairs = tracker::compared(templates);
   print_table(pairs);
   print_verdict(pairs.front());
-  if (!json.empty()) LIMN_TRY_STATUS(write_file(json, json_text(pairs)));
+  if (!json.empty()) LIMN_TRY_STATUS(write_file(json, similarities_json(pairs)));
   return {};
 }
 

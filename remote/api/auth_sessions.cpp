@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "remote/api/guest_name.h"
+
 namespace limn::remote {
 namespace {
 
@@ -45,12 +47,6 @@ std::optional<std::array<unsigned char, k_token_bytes>> token_from_hex(const std
   return bytes;
 }
 
-std::string lower_case(std::string text) {
-  for (char& c : text)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return text;
-}
-
 // The network whose attempts are counted together: one IPv4 address, or an IPv6 network (/64).
 std::string network_of(const std::string& address) {
   in6_addr six{};
@@ -72,9 +68,8 @@ AuthSessions::AuthSessions() {
 
 std::string AuthSessions::unique_name(const std::string& name) const {
   const auto is_taken = [&](const std::string& wanted) {
-    return std::any_of(sessions_.begin(), sessions_.end(), [&](const Session& session) {
-      return lower_case(session.guest.name) == lower_case(wanted);
-    });
+    return std::any_of(sessions_.begin(), sessions_.end(),
+                       [&](const Session& session) { return look_alike(session.guest.name, wanted); });
   };
   std::string out = name;
   for (int i = 2; is_taken(out); ++i) out = fmt::format("{} ({})", name, i);
@@ -125,7 +120,9 @@ std::variant<AuthSessions::Paired, AuthSessions::WrongPin, AuthSessions::Wait> A
   }
   std::erase_if(sessions_, [&](const Session& session) { return now >= session.guest.until; });
   if (replaced) end_session(replaced->number);
-  if (sessions_.size() >= k_max_sessions) sessions_.erase(sessions_.begin());
+  const auto has_role = [&](const Session& session) { return session.guest.role == *role; };
+  if (std::count_if(sessions_.begin(), sessions_.end(), has_role) >= static_cast<int>(k_max_sessions))
+    sessions_.erase(std::find_if(sessions_.begin(), sessions_.end(), has_role));
   Session session;
   fill_with_random(session.token.data(), session.token.size());
   session.guest = {++last_number_, unique_name(name), *role, now + k_session_life};

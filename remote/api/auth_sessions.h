@@ -15,7 +15,8 @@ namespace limn::remote {
 
 /// Random bytes of a token.
 constexpr std::size_t k_token_bytes = 32;
-/// How long a guest's session lasts, and how many there are at once. One more ends the oldest.
+/// How long a guest's session lasts, and how many of each role there are at once. One more ends the oldest of
+/// that role, so that who has one role's PIN ends no session of another role.
 constexpr std::chrono::hours k_session_life{12};
 constexpr std::size_t k_max_sessions = 256;
 /// Wrong PINs after which pairing is locked: from one address for that address, from all for everybody.
@@ -55,8 +56,8 @@ class AuthSessions {
 
   /// Begins a session for somebody who knows a PIN. `address` is a numeric IP address; all addresses of an
   /// IPv6 network (/64) count as one. While pairing is locked (Wait) no PIN is compared, so that the answer
-  /// does not show whether it is right. A second guest of the same name is called "Ann (2)". `replaced` is
-  /// the session that the guest has already; it ends.
+  /// does not show whether it is right. A second guest of a name that looks alike is called "Ann (2)".
+  /// `replaced` is the session that the guest has already; it ends.
   std::variant<Paired, WrongPin, Wait> pair(const std::string& pin,
                                             const std::string& name,
                                             const std::string& address,

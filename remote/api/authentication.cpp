@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
 #include "remote/api/messages.h"
 #include "remote/api/responses.h"
 #include "remote/http/own_addresses.h"

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
+#include "remote/api/guest_name.h"
+
 namespace limn::remote {
 namespace {
 
@@ -26,7 +29,7 @@ std::string in_quotes(const std::string& text) {
 std::string found_in(const json& value) {
   return value.is_string()       ? in_quotes(value.get_ref<const std::string&>())
          : value.is_structured() ? std::string(value.type_name())
-                                 : in_quotes(value.dump(-1, ' ', false, json::error_handler_t::replace));
+                                 : in_quotes(json_text(value));
 }
 
 bool has_controls(const std::string& text, bool may_have_lines) {
@@ -174,7 +177,8 @@ bool is_reserved(std::string name) {
   for (char& c : name)
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   const auto& all = reserved_names();
-  return name.find(':') != std::string::npos || std::find(all.begin(), all.end(), name) != all.end();
+  return name.find(':') != std::string::npos ||
+         std::any_of(all.begin(), all.end(), [&](const std::string& own) { return look_alike(name, own); });
 }
 
 void put_number(std::uint32_t number, std::string* out) {
@@ -217,7 +221,9 @@ Result<PairRequest> parse_pairing(std::string_view text) {
   request.name = first == std::string::npos
                      ? "guest"
                      : request.name.substr(first, request.name.find_last_not_of(' ') + 1 - first);
-  if (is_reserved(request.name))
+  if (!is_visible_name(request.name))
+    reader.problem("name", "a name of visible characters and single blanks", "others");
+  else if (is_reserved(request.name))
     reader.problem(
         "name", fmt::format("a name without ':' that is none of Limn's own ({})", list_of(reserved_names())),
         in_quotes(request.name));

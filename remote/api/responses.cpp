@@ -6,10 +6,6 @@
 
 namespace limn::remote {
 
-std::string json_text(const nlohmann::ordered_json& json) {
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-}
-
 HttpResponse json_response(std::string body) {
   return uncached_response("application/json", std::move(body));
 }

@@ -8,9 +8,6 @@
 
 namespace limn::remote {
 
-/// JSON as text. Bytes that are not UTF-8 are replaced, so that every value can be written.
-std::string json_text(const nlohmann::ordered_json& json);
-
 /// Status 200 with JSON, which no cache keeps.
 HttpResponse json_response(std::string body);
 /// Status 200 with bytes of a MIME type, which no cache keeps.

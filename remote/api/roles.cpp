@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
+
 namespace limn::remote {
 namespace {
 
@@ -41,7 +43,7 @@ std::string actions_json() {
                    {"value", action.value},
                    {"what", action.what},
                    {"role", name_of(action.role)}});
-  return all.dump();
+  return json_text(all);
 }
 
 }  // namespace limn::remote

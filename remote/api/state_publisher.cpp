@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
 #include "remote/api/responses.h"
 
 namespace limn::remote {

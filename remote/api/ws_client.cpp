@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
+
 namespace limn::remote {
 
 void Outbox::add_answer(std::string text) {
@@ -20,7 +22,7 @@ void Outbox::end(const std::string& why) {
   if (is_ending_) return;
   is_ending_ = true;
   const nlohmann::ordered_json bye = {{"type", "bye"}, {"why", why}};
-  bye_ = std::make_shared<const std::string>(bye.dump());
+  bye_ = std::make_shared<const std::string>(json_text(bye));
 }
 
 std::optional<Outgoing> Outbox::next_message() {

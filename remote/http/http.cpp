@@ -2,11 +2,13 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
+
 namespace limn::remote {
 
 HttpResponse error_response(int status, const std::string& why) {
   const nlohmann::json body = {{"error", why}};
-  return {status, "application/json", body.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace)};
+  return {status, "application/json", json_text(body)};
 }
 
 const std::vector<std::pair<std::string, std::string>>& security_headers() {

@@ -40,7 +40,8 @@ using TlsStream = beast::ssl_stream<beast::tcp_stream>;
 template <class Stream>
 constexpr bool k_is_tls = std::is_same_v<Stream, TlsStream>;
 
-// Counts connections, by address, and grants or refuses new ones.
+// Counts connections, by address, and grants or refuses new ones. When all slots are taken, a connection that
+// has not sent a whole request makes room for one from an address with fewer connections.
 class ConnectionSlots {
  public:
   explicit ConnectionSlots(const NetworkLimits& limits) : limits_(limits) {}
@@ -55,28 +56,68 @@ class ConnectionSlots {
     }
     Slot(const Slot&) = delete;
     Slot& operator=(const Slot&) = delete;
-    ~Slot() { slots_->count(address_, kind_, -1); }
+    ~Slot() {
+      set_busy();
+      if (!is_evicted_) slots_->count(address_, kind_, -1);
+    }
     const std::string& address() const { return address_; }
     Kind kind() const { return kind_; }
 
+    // The connection waits for a request; `close` closes it.
+    void set_waiting(std::function<void()> close) {
+      if (kind_ != Kind::served || is_evicted_) return;
+      set_busy();
+      waiting_number_ = ++slots_->last_waiting_;
+      close_ = std::move(close);
+      slots_->waiting_.emplace(waiting_number_, this);
+    }
+    // A request arrived, or the connection became a WebSocket: it is not closed for another one.
+    void set_busy() { slots_->waiting_.erase(waiting_number_); }
+
    private:
+    friend class ConnectionSlots;
     ConnectionSlots* slots_;
     std::string address_;
     Kind kind_;
+    std::uint64_t waiting_number_ = 0;
+    std::function<void()> close_;
+    bool is_evicted_ = false;
   };
 
   // Null: there is no slot left, not even for an answer that says so.
   std::unique_ptr<Slot> acquire(const std::string& address) {
-    const auto at = per_address_.find(address);
-    const bool is_over_limit = at != per_address_.end() && !is_loopback(address) &&
-                               at->second >= static_cast<int>(limits_.per_address);
-    const bool is_full = served_ >= static_cast<int>(limits_.connections);
-    if (!is_full && !is_over_limit) return std::make_unique<Slot>(this, address, Kind::served);
+    const bool is_over_limit =
+        !is_loopback(address) && connections_of(address) >= static_cast<int>(limits_.per_address);
+    if (!is_over_limit && (has_room() || evict_for(address)))
+      return std::make_unique<Slot>(this, address, Kind::served);
     if (rejected_ >= static_cast<int>(limits_.rejected)) return nullptr;
     return std::make_unique<Slot>(this, address, Kind::rejected);
   }
 
  private:
+  bool has_room() const { return served_ < static_cast<int>(limits_.connections); }
+
+  int connections_of(const std::string& address) const {
+    const auto at = per_address_.find(address);
+    return at == per_address_.end() ? 0 : at->second;
+  }
+
+  // Closes the connection that has waited longest of the address with the most connections, if it has more
+  // than this address. Returns whether there is room.
+  bool evict_for(const std::string& address) {
+    const auto most = std::max_element(waiting_.begin(), waiting_.end(), [&](const auto& a, const auto& b) {
+      return connections_of(a.second->address()) < connections_of(b.second->address());
+    });
+    if (most == waiting_.end() || connections_of(most->second->address()) <= connections_of(address))
+      return false;
+    Slot* const slot = most->second;
+    slot->set_busy();
+    slot->is_evicted_ = true;
+    count(slot->address(), Kind::served, -1);
+    slot->close_();
+    return has_room();
+  }
+
   void count(const std::string& address, Kind kind, int change) {
     if (kind == Kind::rejected) {
       rejected_ += change;
@@ -89,6 +130,8 @@ class ConnectionSlots {
   NetworkLimits limits_;
   int served_ = 0, rejected_ = 0;
   std::map<std::string, int> per_address_;
+  std::map<std::uint64_t, Slot*> waiting_;  // in the order in which they began to wait
+  std::uint64_t last_waiting_ = 0;
 };
 
 // What all connections share.
@@ -255,6 +298,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
         timeout_(shared->io) {}
 
   void run() {
+    wait_for_request();
     if constexpr (k_is_tls<Stream>) {
       beast::get_lowest_layer(stream_).expires_after(shared_->limits.read);
       stream_.async_handshake(asio::ssl::stream_base::server,
@@ -267,6 +311,13 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
   }
 
  private:
+  // Until a whole request has come, the connection may be closed for another one.
+  void wait_for_request() {
+    slot_->set_waiting([weak = this->weak_from_this()] {
+      if (const auto self = weak.lock()) beast::get_lowest_layer(self->stream_).close();
+    });
+  }
+
   void begin() {
     if (slot_->kind() == ConnectionSlots::Kind::rejected)
       return write_last(error_response(k_http_unavailable, "too many connections. Try again in a moment."));
@@ -275,6 +326,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
 
   // Reads a whole request within the time limit. A client that is late within a request gets an answer.
   void read() {
+    wait_for_request();
     parser_.emplace();
     parser_->header_limit(static_cast<std::uint32_t>(shared_->limits.header_bytes));
     parser_->body_limit(shared_->limits.body_bytes);
@@ -333,6 +385,7 @@ class Connection : public std::enable_shared_from_this<Connection<Stream>> {
   }
 
   void handle_request() {
+    slot_->set_busy();
     const HttpRequest received = request();
     is_head_ = received.method == "HEAD";
     keeps_alive_ = parser_->get().keep_alive();

@@ -15,7 +15,9 @@ namespace limn::remote {
 
 /// The limits of connections.
 struct NetworkLimits {
-  std::size_t connections = 64;  ///< Open at once; more are answered 503.
+  /// Open at once. One more closes a connection without a request, of an address with more connections; if
+  /// there is none, it is answered 503.
+  std::size_t connections = 64;
   std::size_t per_address = 32;  ///< Without limit for the loopback. One phone's page uses up to seven.
   std::size_t rejected = 32;  ///< Connections that are being answered 503; more are closed without an answer.
   std::size_t header_bytes = 8 * 1024;  ///< Longest headers of one request.

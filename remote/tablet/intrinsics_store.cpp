@@ -5,6 +5,7 @@
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/log.h"
 
 namespace limn::remote {
@@ -88,7 +89,7 @@ Status save_lenses(const fs::path& folder,
   }
   LIMN_TRY_STATUS(make_folder(folder));
   const nlohmann::ordered_json json = {{"schema", k_lenses_schema}, {"lenses", list}};
-  LIMN_TRY_STATUS(write_file(file_of(folder, device), json.dump(1) + "\n"));
+  LIMN_TRY_STATUS(write_file(file_of(folder, device), json_text(json, 1) + "\n"));
   remove_oldest_files(folder);
   return {};
 }

@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "core/config.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/screen_encoding.h"
 #include "core/stopwatch.h"
@@ -88,7 +89,7 @@ bool is_in_image(const Imager& view, const scene::Scene& scene, const scene::Pos
 }
 
 CompositeImage no_image(const std::string& why) {
-  return {nlohmann::json{{"sees", "nothing"}, {"why", why}, {"markers", 0}}.dump(), {}};
+  return {json_text(nlohmann::json{{"sees", "nothing"}, {"why", why}, {"markers", 0}}), {}};
 }
 
 }  // namespace
@@ -373,27 +374,25 @@ CompositeImage TabletView::Impl::frame_with_parts(const WaitingFrame& frame,
   CompositeImage result{{}, device::encode_jpeg(out, k_quality), view_from_world.inverse().translation};
   const double encode_ms = milliseconds_since(encoding);
   const Lens& lens = observation.view->lens;
-  result.json =
-      nlohmann::json{
-          {"sees", is_in_image(*observation.view, *snapshot.scene, posed) ? "prototype" : "markers"},
-          {"why", ""},
-          {"markers", observation.markers},
-          {"view_from_world", to_json(view_from_world)},
-          {"rms_px", observation.rms_px},
-          {"lens",
-           {{"model", lens.model.name()},
-            {"values", lens.values},
-            {"focal_stddev_px", observation.focal_stddev_px},
-            {"frames", observation.lens_frames}}},
-          {"ms",
-           {{"decode", decode_ms}, {"track", track_ms}, {"composite", composite_ms}, {"encode", encode_ms}}}}
-          .dump();
+  result.json = json_text(nlohmann::json{
+      {"sees", is_in_image(*observation.view, *snapshot.scene, posed) ? "prototype" : "markers"},
+      {"why", ""},
+      {"markers", observation.markers},
+      {"view_from_world", to_json(view_from_world)},
+      {"rms_px", observation.rms_px},
+      {"lens",
+       {{"model", lens.model.name()},
+        {"values", lens.values},
+        {"focal_stddev_px", observation.focal_stddev_px},
+        {"frames", observation.lens_frames}}},
+      {"ms",
+       {{"decode", decode_ms}, {"track", track_ms}, {"composite", composite_ms}, {"encode", encode_ms}}}});
   return result;
 }
 
 CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot) {
   const auto without = [](const char* why) {
-    return CompositeImage{nlohmann::json{{"why", why}}.dump(), {}};
+    return CompositeImage{json_text(nlohmann::json{{"why", why}}), {}};
   };
   if (snapshot.room.image.empty()) return without("The room's camera has shown nothing yet.");
   cv::Mat image = snapshot.paint.is_linear_camera ? srgb_image(snapshot.room.image) : snapshot.room.image;
@@ -413,7 +412,7 @@ CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot
   const scene::PosedScene posed = scene::compose_scene(*snapshot.scene, snapshot.show_state, tracks);
   const cv::Mat out =
       split_composite(camera, image, posed, tracks, snapshot, TabletViewMode::as_screen, &room);
-  return {nlohmann::json{{"why", ""}}.dump(), device::encode_jpeg(out, k_quality)};
+  return {json_text(nlohmann::json{{"why", ""}}), device::encode_jpeg(out, k_quality)};
 }
 
 TabletView::TabletView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -297,9 +297,11 @@ TEST(House, ThirdPartiesStayInTheirRooms) {
   EXPECT_GT(seen, 20) << "the sources were not found";
 }
 
+// core/json_text.h is a template over JSON; no other header may include it.
 TEST(House, HeadersKeepSlowThirdPartiesOut) {
   for (const Include& include : includes()) {
-    if (include.file.extension() != ".h") continue;
+    if (include.file.extension() != ".h" || include.file.filename() == "json_text.h") continue;
+    EXPECT_NE(include.what, "core/json_text.h") << include.file;
     for (const char* slow : {"nlohmann/json.hpp", "opencv2/opencv.hpp", "CLI/", "boost/", "ceres/", "assimp/",
                              "embree3/", "mrcal/"}) {
       EXPECT_FALSE(include.what.starts_with(slow)) << include.file << " includes " << include.what;
@@ -490,6 +492,20 @@ TEST(House, FunctionsSayWhatTheyDoToWhat) {
     }
   }
   EXPECT_GT(seen, 400) << "the sources were not found";
+}
+
+// nlohmann's dump() throws on bytes that are not UTF-8, which names of files and devices may have.
+TEST(House, JsonIsWrittenByJsonText) {
+  const Names may = {"core/json_text.h", "core/opencv_file.cpp"};  // the latter writes numbers only
+  for (const auto& [room, rooms] : allowed()) {
+    for (const fs::path& file : code_in(root() / room)) {
+      std::ifstream in(file);
+      const std::string code = code_alone({std::istreambuf_iterator<char>(in), {}});
+      const std::string name = fs::relative(file, root()).generic_string();
+      EXPECT_TRUE(may.contains(name) || code.find(".dump(") == std::string::npos)
+          << name << ": use json_text() of core/json_text.h";
+    }
+  }
 }
 
 // Lines on which a comment begins with "of", which says what it belongs to but not what it is. Lines that

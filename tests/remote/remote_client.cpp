@@ -33,16 +33,20 @@ struct RemoteClient::Tls {
   }
 };
 
-RemoteClient::RemoteClient(int port, bool is_encrypted, const std::string& host) {
+RemoteClient::RemoteClient(int port, bool is_encrypted, const std::string& host, const std::string& from) {
   host_ = fmt::format("{}:{}", host, port);
   const int handle = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(static_cast<std::uint16_t>(port));
   ::inet_pton(AF_INET, host.c_str(), &address.sin_addr);
+  sockaddr_in own{};
+  own.sin_family = AF_INET;
+  ::inet_pton(AF_INET, from.c_str(), &own.sin_addr);
   const timeval patience{10, 0};
   ::setsockopt(handle, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
-  if (::connect(handle, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+  if (::bind(handle, reinterpret_cast<const sockaddr*>(&own), sizeof own) != 0 ||
+      ::connect(handle, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     ::close(handle);
     return;
   }

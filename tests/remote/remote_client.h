@@ -23,7 +23,11 @@ class RemoteClient {
     std::string bytes;
   };
 
-  explicit RemoteClient(int port, bool is_encrypted = false, const std::string& host = "127.0.0.1");
+  /// `from`: the address of this machine that it connects from.
+  explicit RemoteClient(int port,
+                        bool is_encrypted = false,
+                        const std::string& host = "127.0.0.1",
+                        const std::string& from = "0.0.0.0");
   RemoteClient(const RemoteClient&) = delete;
   RemoteClient& operator=(const RemoteClient&) = delete;
   ~RemoteClient();  ///< vanishes without a word

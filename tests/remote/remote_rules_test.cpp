@@ -10,6 +10,7 @@
 #include "core/file.h"
 #include "gui/qr_code.h"
 #include "remote/api/auth_sessions.h"
+#include "remote/api/guest_name.h"
 #include "remote/api/messages.h"
 #include "remote/api/ws_client.h"
 #include "remote/http/http.h"
@@ -290,16 +291,46 @@ TEST(AuthSessions, ANetworkOfIPv6IsOnePlace) {
   EXPECT_TRUE(std::holds_alternative<AuthSessions::WrongPin>(guests.pair(wrong, "", "2001:db8:0:1::1", now)));
 }
 
-TEST(AuthSessions, SessionsAreBounded) {
+TEST(AuthSessions, SessionsOfEachRoleAreBounded) {
   AuthSessions guests;
   const AuthSessions::Time now{};
   std::string first;
+  const auto operates = guests.pair(guests.pin(Role::operate), "", "10.0.0.2", now);
   for (std::size_t i = 0; i < k_max_sessions + 10; ++i) {
     const auto paired = guests.pair(guests.pin(Role::look), "", "10.0.0.1", now);
     if (i == 0) first = std::get<AuthSessions::Paired>(paired).token;
   }
-  EXPECT_EQ(guests.count(), k_max_sessions);
+  EXPECT_EQ(guests.count(), k_max_sessions + 1);
   EXPECT_FALSE(guests.find(first, now));
+  EXPECT_TRUE(guests.find(std::get<AuthSessions::Paired>(operates).token, now));
+}
+
+TEST(GuestName, IsVisible) {
+  for (const char* name : {"Ann", "Ann Lee", "J\xc3\xbcrgen", "\xe6\x9d\x8e", "O'Neil-3", "\xd8\xa3\xd9\x86"})
+    EXPECT_TRUE(is_visible_name(name)) << name;
+  for (const char* name : {"", " Ann", "Ann ", "Ann  Lee", "An\xe2\x80\x8bn", "\xe2\x80\xaennA",
+                           "Ann\xc2\xa0Lee", "An\xc2\xadn", "\xe3\x85\xa4", "An\nn", "An\xffn"})
+    EXPECT_FALSE(is_visible_name(name)) << name;
+}
+
+TEST(GuestName, LooksLikeAnother) {
+  EXPECT_TRUE(look_alike("operator", "Operator"));
+  EXPECT_TRUE(look_alike("operator", "\xd0\xbeper\xd0\xb0tor")) << "with Cyrillic o and a";
+  EXPECT_FALSE(look_alike("operator", "operators"));
+  EXPECT_FALSE(look_alike("Ann", "Ben"));
+}
+
+TEST(GuestName, OfLimnOrInvisibleIsRefused) {
+  const auto refusal = [](const std::string& name) {
+    const auto read = parse_pairing(json{{"pin", "123456"}, {"name", name}}.dump());
+    return read ? std::string() : read.message();
+  };
+  EXPECT_EQ(refusal("  Ann "), "");
+  EXPECT_NE(refusal("\xd0\xbeperator").find("none of Limn's own"), std::string::npos);
+  EXPECT_NE(refusal("op\xe2\x80\x8b"
+                    "erator")
+                .find("visible characters"),
+            std::string::npos);
 }
 
 TEST(Outbox, KeepsTheNewestAlone) {

@@ -244,6 +244,17 @@ TEST_F(AServer, HoldsNoMoreThanItsConnections) {
   EXPECT_EQ(status, 200) << "a place was given back";
 }
 
+TEST_F(AServer, ClosesSilentConnectionsOfOneAddressForThoseOfOthers) {
+  open();
+  const auto operates = guest(Role::operate);
+  std::vector<std::unique_ptr<RemoteClient>> silent;
+  for (std::size_t i = 0; i < NetworkLimits{}.connections + 20; ++i)
+    silent.push_back(std::make_unique<RemoteClient>(server_->port(), false, "127.0.0.1", "127.0.0.2"));
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(client()->get("/").status, 200) << i;
+  operates->send_text("?");
+  EXPECT_TRUE(operates->message_of("refused")) << "a WebSocket stays";
+}
+
 TEST_F(AServer, AnswersEveryFrameOfAWindowWithItsNumber) {
   open({}, echoing_providers(5ms));
   const auto tablet = guest(Role::look);

@@ -2,8 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
@@ -568,6 +570,31 @@ TEST(Mesh, BadFilesAreErrorsThatNameThem) {
     EXPECT_NE(mesh.message().find(bad.name), std::string::npos) << mesh.message();
   }
   EXPECT_FALSE(load_mesh("nowhere.stl", LengthUnit::metre));
+}
+
+TEST(Mesh, DamagedPlyFilesAreErrorsWithinASecond) {
+  const fs::path folder = test::test_folder();
+  const std::string vertices =
+      "element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\n";
+  const std::string points = "0 0 0\n1 0 0\n0 1 0\n";
+  const std::map<std::string, std::string> files = {
+      {"cut-header.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"},
+      {"no-corners.ply", "ply\nformat ascii 1.0\n" + vertices + "end_header\n" + points + "0\n"},
+      {"too-many.ply", "ply\nformat ascii 1.0\nelement vertex 4000000000\nproperty float x\nend_header\n0\n"},
+      {"junk.ply", "ply\nformat ascii 1.0\neleme" + std::string(100, '\x1f')},
+      {"cut.ply", "ply\nformat ascii 1.0\n" + vertices + "end_header\n0 0 0\n1 0"},
+      {"line-feed.ply",
+       "ply\nformat binary_little_endian 1.0\n" + vertices + "end_header\n\n" + std::string(20, '\0')}};
+  for (const auto& [name, content] : files) {
+    ASSERT_TRUE(write_file(folder / name, content));
+    const auto begun = std::chrono::steady_clock::now();
+    const auto mesh = load_mesh(folder / name, LengthUnit::metre);
+    ASSERT_FALSE(mesh) << name;
+    EXPECT_NE(mesh.message().find(name), std::string::npos) << mesh.message();
+    EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(3))
+        << name << ": a second is asked for";
+  }
 }
 
 TEST(Nearest, AgreesWithASearchOverSamplesOfACube) {

@@ -288,6 +288,21 @@ TEST(Scene, PartsThatCannotBeLoadedAreLeftOutWhenThatIsAskedFor) {
   EXPECT_EQ(skipped_variants.size(), 3u);
 }
 
+TEST(Scene, PartsWhoseFileNamesAreNotUtf8AreLeftOut) {
+  const fs::path door = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door",
+                 folder = test::test_folder() / "door";
+  fs::copy(door, folder);
+  fs::create_directories(folder / "slots/mirror");
+  fs::copy(door / "mirror-city.glb", folder / "slots/mirror/gr\xfcn.glb");
+  std::vector<SkippedVariant> skipped_variants;
+  const auto scene = load_scene(folder, &skipped_variants);
+  ASSERT_TRUE(scene) << scene.message();
+  ASSERT_EQ(skipped_variants.size(), 1u);
+  EXPECT_EQ(skipped_variants[0].variant, "gr\xef\xbf\xbdn");
+  EXPECT_NE(skipped_variants[0].why.find("expected a file name in UTF-8"), std::string::npos)
+      << skipped_variants[0].why;
+}
+
 TEST(Scene, TheDoorOfTheConfigFolderLoads) {
   const auto scene = load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/door");
   ASSERT_TRUE(scene) << scene.message();

@@ -172,9 +172,9 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
     auto sender = UdpSocket::sending({"127.0.0.1", "47312"});
     const auto has_answered = [&](const std::string& wanted) {
       std::array<std::uint8_t, 2048> bytes{};
-      while (const auto length = answers->next(bytes))
-        if (std::string(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(*length)).find(wanted) !=
-            std::string::npos)
+      while (const auto datagram = answers->next(bytes))
+        if (std::string(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(datagram->length))
+                .find(wanted) != std::string::npos)
           return true;
       return false;
     };
@@ -518,7 +518,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
     wait_for_images(16);
     fs::resize_file(dropped, 1000);
     wait_for_images(16);
-    std::raise(SIGTERM);
+    std::raise(SIGHUP);
   });
   const Status lived = apps::run_live(options);
   person.join();

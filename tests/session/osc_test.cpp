@@ -149,6 +149,7 @@ TEST(Osc, RefusesWithAReason) {
   }
   has(refusal(osc_message("/limn/choose_variant", {"mirror", std::string(300, 'x')})), "found 300 bytes");
   has(refusal(osc_message("/limn/save_look", {"a\nb"})), "printable");
+  has(refusal(osc_message("/limn/viewer", {"\xff"})), "UTF-8");
   has(refusal(std::vector<std::uint8_t>(k_longest_osc + 1, '/')), "found 1025");
   has(refusal(bytes_of("#bundle\0\0\0\0\0\0\0\0\1\0\0\0\x10/limn/freeze\0\0\0\0"s)), "found a bundle");
   const auto good = osc_message("/limn/nudge", {"mirror", 1, 2, 3.5F});
@@ -375,6 +376,22 @@ TEST_F(AnOscSession, TellsWhatChanges) {
   // Everything is sent again, for programs that started later.
   EXPECT_GT(received_lines(shifted(Stamp{}, 1)).size(), all.size());
   lo_server_free(server);
+}
+
+TEST_F(AnOscSession, ReceivesFromOneMachineOnly) {
+  for (const auto& [from, accepted] : {std::pair{"127.0.0.1", true}, {"192.168.7.20", false}}) {
+    auto port = OscPort::open("0", "", from);
+    ASSERT_TRUE(port) << port.message();
+    const lo_address to = lo_address_new("127.0.0.1", std::to_string(port->port()).c_str());
+    ASSERT_GT(lo_send(to, "/limn/blackout", "T"), 0);
+    lo_address_free(to);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    port->apply_edits(&*session_, &*telemetry_, Stamp{});
+    EXPECT_EQ(session_->show_state().blackout, accepted) << from;
+    scene::Edit light = scene::make_edit(scene::ActionId::blackout);
+    light.value = "off";
+    ASSERT_TRUE(session_->edit(light, "test", Stamp{}));
+  }
 }
 
 TEST(OscPort, SaysWhatIsWrongWithAPlace) {

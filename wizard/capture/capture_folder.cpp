@@ -11,6 +11,7 @@
 #include "calib/capture.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 
 namespace limn::wizard {
 namespace {
@@ -28,7 +29,7 @@ std::string difference(const nlohmann::json& then, const nlohmann::json& now) {
   for (const auto* leaves : {&leaves_then, &leaves_now})
     for (const auto& leaf : leaves->items()) keys.insert(leaf.key());
   const auto field_text = [](const nlohmann::json& leaves, const std::string& key) {
-    return leaves.contains(key) ? leaves[key].dump() : std::string("nothing");
+    return leaves.contains(key) ? json_text(leaves[key]) : std::string("nothing");
   };
   for (const std::string& key : keys) {
     if (field_text(leaves_then, key) == field_text(leaves_now, key)) continue;
@@ -66,7 +67,7 @@ Result<std::string> captured_plan(const fs::path& plan_path, const fs::path& wor
     all[name] = ordered_json::parse(text, nullptr, true, true);
   }
   all["plan"].erase("world");
-  return all.dump(2) + "\n";
+  return json_text(all, 2) + "\n";
 }
 
 std::string captured_plan(const std::string& board,
@@ -77,7 +78,7 @@ std::string captured_plan(const std::string& board,
   for (const auto* devices : {&captures.cameras, &captures.projectors})
     for (const calib::CapturedDevice& device : *devices)
       all["devices"][device.name] = {device.width, device.height};
-  return all.dump(2) + "\n";
+  return json_text(all, 2) + "\n";
 }
 
 Status open_captures(const calib::CaptureSet& captures, const std::string& plan_json) {

@@ -11,6 +11,7 @@
 #include "calib/observations.h"
 #include "core/config.h"
 #include "core/file.h"
+#include "core/json_text.h"
 
 namespace limn::wizard {
 namespace {
@@ -106,7 +107,7 @@ Rig repaired(const calib::RigCheck& result) {
                              {"device", move.device},
                              {"degrees", rounded(move.degrees)},
                              {"mm", rounded(move.mm)}};
-  rig.provenance_json = provenance.dump();
+  rig.provenance_json = json_text(provenance);
   rig.covariance_json.clear();
   return rig;
 }
@@ -159,7 +160,7 @@ Result<CheckedRig> recheck_rig(const Rig& rig,
   CheckedRig checked;
   LIMN_TRY(checked.rechecked.result, calib::check_rig(rig, observed.observations, options));
   checked.rechecked.images = shown_images(captures);
-  checked.json = json_of(checked.rechecked, poses).dump(2) + "\n";
+  checked.json = json_text(json_of(checked.rechecked, poses), 2) + "\n";
   checked.rechecked.result.rig = repaired(checked.rechecked.result);
   LIMN_TRY_STATUS(make_folder(out));
   LIMN_TRY_STATUS(write_file(out / "recheck.json", checked.json));

@@ -10,6 +10,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/rig.h"
@@ -268,7 +269,7 @@ Status write_images(const scene::ScanSurface& map, const fs::path& out) {
 
 Status write_pose(const Pose& world_from_prototype, const fs::path& out) {
   const nlohmann::ordered_json poses = {{"world_from_prototype", to_json(world_from_prototype)}};
-  return write_file(out / "poses.json", poses.dump(2) + "\n");
+  return write_file(out / "poses.json", json_text(poses, 2) + "\n");
 }
 
 // Writes the pose that the markers alone give.
@@ -278,7 +279,7 @@ Result<MeshAligned> written_markers_pose(const Start& start, const AlignOptions&
   if (start.covariance) aligned.registration.covariance = *start.covariance;
   aligned.how = start.how;
   LIMN_TRY_STATUS(make_folder(command.out));
-  LIMN_TRY_STATUS(write_file(command.out / "align.json", json_of(aligned, {}, seconds).dump(2) + "\n"));
+  LIMN_TRY_STATUS(write_file(command.out / "align.json", json_text(json_of(aligned, {}, seconds), 2) + "\n"));
   LIMN_TRY_STATUS(write_pose(start.world_from_prototype, command.out));
   return aligned;
 }
@@ -319,8 +320,9 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
   const scene::ScanSurface map = coloured(scan, residuals, aligned.registration.world_from_prototype);
   LIMN_TRY_STATUS(scene::save_ply(map, command.out / "residual.ply"));
   LIMN_TRY_STATUS(write_images(map, command.out));
-  LIMN_TRY_STATUS(write_file(command.out / "align.json",
-                             json_of(aligned, differences, 1e-3 * milliseconds_since(begun)).dump(2) + "\n"));
+  LIMN_TRY_STATUS(
+      write_file(command.out / "align.json",
+                 json_text(json_of(aligned, differences, 1e-3 * milliseconds_since(begun)), 2) + "\n"));
   LIMN_TRY_STATUS(write_pose(aligned.registration.world_from_prototype, command.out));
   if (!command.body.empty())
     LIMN_TRY_STATUS(write_markers(command, aligned.registration.world_from_prototype));

@@ -9,6 +9,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "core/json_text.h"
 #include "core/stopwatch.h"
 #include "scene/scan_preview.h"
 
@@ -125,11 +126,12 @@ Status write_images(const calib::Scan& scan, const std::filesystem::path& out) {
 }
 
 Status write_scan(const calib::Scan& scan, double seconds, const std::filesystem::path& out) {
-  LIMN_TRY_STATUS(make_folder(out));
-  LIMN_TRY_STATUS(scene::save_ply(scan.points, out / "points.ply"));
-  LIMN_TRY_STATUS(scene::save_ply(scan.mesh, out / "mesh.ply"));
-  LIMN_TRY_STATUS(write_images(scan, out));
-  return write_file(out / "scan.json", scan_json(scan, seconds).dump(2) + "\n");
+  return write_together(out, [&](const std::filesystem::path& into) -> Status {
+    LIMN_TRY_STATUS(scene::save_ply(scan.points, into / "points.ply"));
+    LIMN_TRY_STATUS(scene::save_ply(scan.mesh, into / "mesh.ply"));
+    LIMN_TRY_STATUS(write_images(scan, into));
+    return write_file(into / "scan.json", json_text(scan_json(scan, seconds), 2) + "\n");
+  });
 }
 
 }  // namespace

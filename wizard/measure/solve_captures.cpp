@@ -147,9 +147,11 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   report.explanation = calib::explain(report.observed, report.solution, report.assessment);
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
-  LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, options.out));
-  if (!response.responses.projectors.empty())
-    LIMN_TRY_STATUS(save_responses(response.responses, response.mixings, options.out));
+  LIMN_TRY_STATUS(write_together(options.out, [&](const std::filesystem::path& into) -> Status {
+    LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, into));
+    return response.responses.projectors.empty() ? Status()
+                                                 : save_responses(response.responses, response.mixings, into);
+  }));
   return report;
 }
 
