@@ -27,8 +27,9 @@ std::vector<Row> worst_first(std::span<const CheckResult> results) {
   std::vector<Row> rows;
   for (const CheckResult& result : results)
     for (const CheckReading& reading : result.readings) rows.push_back({&result, &reading});
-  std::stable_sort(rows.begin(), rows.end(),
-                   [](const Row& a, const Row& b) { return a.reading->limit_share() > b.reading->limit_share(); });
+  std::stable_sort(rows.begin(), rows.end(), [](const Row& a, const Row& b) {
+    return a.reading->limit_share() > b.reading->limit_share();
+  });
   return rows;
 }
 
