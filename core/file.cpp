@@ -35,8 +35,8 @@ int write_all(int fd, std::string_view content) {
   return 0;
 }
 
-// Moves every file of `fresh` to `folder`; what it replaces goes to `old`. If one cannot be moved, all are as
-// before.
+// Moves every file of `fresh` to `folder`, where no file is absent meanwhile; `old` gets links to what it
+// replaces. If one cannot be moved, all are as before.
 Status replace_files(const fs::path& fresh, const fs::path& folder, const fs::path& old) {
   std::vector<fs::path> names;
   for (const auto& entry : fs::directory_iterator(fresh)) names.push_back(entry.path().filename());
@@ -45,9 +45,12 @@ Status replace_files(const fs::path& fresh, const fs::path& folder, const fs::pa
   std::size_t replaced = 0;
   for (; replaced < names.size() && code == 0; ++replaced) {
     const fs::path& name = names[replaced];
-    const bool had_old = ::rename((folder / name).c_str(), (old / name).c_str()) == 0;
-    if (!had_old && errno != ENOENT) code = errno;
-    if (code == 0 && ::rename((fresh / name).c_str(), (folder / name).c_str()) != 0) code = errno;
+    const fs::path target = folder / name, backup = old / name;
+    if (::link(target.c_str(), backup.c_str()) != 0 && errno != ENOENT) {
+      code = errno;  // Some file systems have no links; a folder is not replaced.
+      if (fs::is_regular_file(target) && ::rename(target.c_str(), backup.c_str()) == 0) code = 0;
+    }
+    if (code == 0 && ::rename((fresh / name).c_str(), target.c_str()) != 0) code = errno;
   }
   if (code == 0) return {};
   const fs::path problem = folder / names[replaced - 1];

@@ -5,6 +5,7 @@
 #include "core/log.h"
 #include "core/user_folder.h"
 #include "remote/http/own_addresses.h"
+#include "session/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -44,7 +45,7 @@ std::string shown_host(const std::string& host) {
 }
 
 Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, const std::string& host) {
-  if (is_loopback(host) && !options.always_encrypted) return std::optional<Certificate>();
+  if (session::is_loopback(host) && !options.always_encrypted) return std::optional<Certificate>();
   fs::path keys = options.keys;
   if (keys.empty()) {
     LIMN_TRY(keys, user_folder());
@@ -58,7 +59,7 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
 RequestHandler::Setup Server::handler_setup(const std::string& host,
                                             const std::optional<Certificate>& certificate) {
   return {.authentication = {.is_encrypted = certificate.has_value(),
-                             .is_loopback = is_loopback(host),
+                             .is_loopback = session::is_loopback(host),
                              .cookie = fmt::format("limn-{}", network_->port())},
           .authority = certificate ? certificate->authority : "",
           .files = {},

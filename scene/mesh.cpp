@@ -1,6 +1,5 @@
 #include "scene/mesh.h"
 
-#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <meshoptimizer.h>
 
@@ -321,9 +320,8 @@ Result<Mesh> load_mesh(const fs::path& path, LengthUnit units) {
   }
   LIMN_TRY_STATUS(try_mesh_reader(path));
   Assimp::Importer importer;
-  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
   Complaints complaints;
-  const aiScene* scene = importer.ReadFile(path.string(), k_mesh_reader_steps);
+  const aiScene* scene = read_with_assimp(path, &importer);
   if (complaints.text().find("out-of-range indices") != std::string::npos) {
     return error(
         "{}: expected triangles of the mesh's own vertices, found indices beyond their number. Export it "

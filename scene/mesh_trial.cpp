@@ -21,8 +21,11 @@ namespace limn::scene {
 
 namespace fs = std::filesystem;
 
-const unsigned k_mesh_reader_steps =
-    aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure;
+const aiScene* read_with_assimp(const fs::path& path, Assimp::Importer* importer) {
+  importer->SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  return importer->ReadFile(path.string(),
+                            aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
+}
 
 namespace {
 
@@ -59,8 +62,7 @@ void limit(int resource, rlim_t value) {
   dup2(open("/dev/null", O_WRONLY | O_CLOEXEC), STDERR_FILENO);  // assimp's asserts are not for people
   try {
     Assimp::Importer importer;
-    importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    importer.ReadFile(path.string(), k_mesh_reader_steps);
+    read_with_assimp(path, &importer);
     const std::string problem = importer.GetErrorString();
     _exit(problem.find("bad_alloc") != std::string::npos ? k_no_memory : 0);
   } catch (const std::bad_alloc&) {

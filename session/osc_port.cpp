@@ -44,9 +44,10 @@ Result<OscPort> OscPort::open(const std::string& receive_at,
   };
   if (!from.empty() && receive_at.empty())
     return usage_error("--osc-from: expected --osc with it, found none.");
-  if (!from.empty() && !is_numeric_address(from))
+  const auto sender = numeric_address(from);
+  if (!from.empty() && !sender)
     return usage_error("--osc-from: expected a numeric address such as 192.168.7.20, found '{}'.", from);
-  out.from_ = from;
+  out.from_ = sender.value_or("");
   if (!receive_at.empty()) {
     const auto place = net_place(receive_at, "127.0.0.1", true);
     if (!place) return named("--osc", place.error());
@@ -54,7 +55,7 @@ Result<OscPort> OscPort::open(const std::string& receive_at,
     if (!socket) return named("--osc", socket.error());
     out.input_ = std::move(*socket);
     log_info("live: receives OSC at {}, UDP port {}", place->host, out.port());
-    if (from.empty() && !is_loopback_address(place->host))
+    if (from.empty() && !is_loopback(place->host))
       log_warning(
           "live: OSC asks nobody for a PIN: every program that reaches {} can change the session. "
           "--osc-from ADDRESS accepts one machine only.",

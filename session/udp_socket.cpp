@@ -63,13 +63,21 @@ Result<NetPlace> net_place(const std::string& text, const std::string& default_h
   return place;
 }
 
-bool is_numeric_address(const std::string& text) {
-  in6_addr address = {};
-  return inet_pton(AF_INET, text.c_str(), &address) == 1 || inet_pton(AF_INET6, text.c_str(), &address) == 1;
+std::optional<std::string> numeric_address(const std::string& text) {
+  for (const int family : {AF_INET, AF_INET6}) {
+    in6_addr address{};
+    char usual[INET6_ADDRSTRLEN] = "";
+    if (inet_pton(family, text.c_str(), &address) == 1 && inet_ntop(family, &address, usual, sizeof usual))
+      return usual;
+  }
+  return std::nullopt;
 }
 
-bool is_loopback_address(const std::string& text) {
-  return text.starts_with("127.") || text == "::1" || text.starts_with(fmt::format("{}127.", k_ipv4_as_ipv6));
+bool is_loopback(const std::string& address) {
+  in_addr four{};
+  in6_addr six{};
+  if (inet_pton(AF_INET, address.c_str(), &four) == 1) return ntohl(four.s_addr) >> 24 == 127;
+  return inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_LOOPBACK(&six);
 }
 
 Result<UdpSocket> UdpSocket::receiving(const NetPlace& place) {

@@ -19,10 +19,10 @@ struct NetPlace {
 /// allowed too: any free port), or an empty host.
 Result<NetPlace> net_place(const std::string& text, const std::string& default_host, bool or_any = false);
 
-/// Whether it is a numeric IPv4 or IPv6 address; an IPv6 address stands without brackets.
-bool is_numeric_address(const std::string& text);
-/// Whether the numeric address can be reached by programs on this machine only.
-bool is_loopback_address(const std::string& text);
+/// The usual spelling of a numeric IPv4 or IPv6 address, without brackets; nullopt: it is something else.
+std::optional<std::string> numeric_address(const std::string& text);
+/// Whether it is a numeric address of the loopback, which no other machine can reach: 127.0.0.0/8 or ::1.
+bool is_loopback(const std::string& address);
 
 struct Datagram {
   std::size_t length = 0;  ///< The whole datagram's, also when it was cut off.

@@ -21,6 +21,7 @@
 
 #include "core/file.h"
 #include "remote/http/own_addresses.h"
+#include "session/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -56,14 +57,10 @@ struct Pair {
   X509Certificate certificate;
 };
 
-bool is_address(const std::string& host) {
-  in6_addr ignored{};
-  return inet_pton(AF_INET, host.c_str(), &ignored) == 1 || inet_pton(AF_INET6, host.c_str(), &ignored) == 1;
-}
-
 bool is_for(X509* certificate, const std::string& host) {
-  return is_address(host) ? X509_check_ip_asc(certificate, host.c_str(), 0) == 1
-                          : X509_check_host(certificate, host.data(), host.size(), 0, nullptr) == 1;
+  return session::numeric_address(host)
+             ? X509_check_ip_asc(certificate, host.c_str(), 0) == 1
+             : X509_check_host(certificate, host.data(), host.size(), 0, nullptr) == 1;
 }
 
 bool is_for_all(X509* certificate, const std::vector<std::string>& hosts) {
@@ -97,7 +94,8 @@ void add_extension(X509* certificate, X509* issuer, int kind, const std::string&
 std::string alternative_names(const std::vector<std::string>& hosts) {
   std::string names;
   for (const std::string& host : hosts)
-    names += fmt::format("{}{}:{}", names.empty() ? "" : ",", is_address(host) ? "IP" : "DNS", host);
+    names +=
+        fmt::format("{}{}:{}", names.empty() ? "" : ",", session::numeric_address(host) ? "IP" : "DNS", host);
   return names;
 }
 
@@ -105,7 +103,7 @@ std::string permitted_names(const std::vector<std::string>& hosts) {
   std::string names = k_permitted;
   for (const std::string& host : hosts) {
     const bool is_v6 = host.find(':') != std::string::npos;
-    names += is_address(host)
+    names += session::numeric_address(host)
                  ? fmt::format(",permitted;IP:{}/{}", host,
                                is_v6 ? "ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff" : "255.255.255.255")
                  : fmt::format(",permitted;DNS:{}", host);

@@ -16,6 +16,7 @@
 #include "core/log.h"
 #include "core/worker_thread.h"
 #include "remote/http/own_addresses.h"
+#include "session/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -87,7 +88,7 @@ class ConnectionSlots {
   // Null: there is no slot left, not even for an answer that says so.
   std::unique_ptr<Slot> acquire(const std::string& address) {
     const bool is_over_limit =
-        !is_loopback(address) && connections_of(address) >= static_cast<int>(limits_.per_address);
+        !session::is_loopback(address) && connections_of(address) >= static_cast<int>(limits_.per_address);
     if (!is_over_limit && (has_room() || evict_for(address)))
       return std::make_unique<Slot>(this, address, Kind::served);
     if (rejected_ >= static_cast<int>(limits_.rejected)) return nullptr;

@@ -9,6 +9,8 @@
 #include <array>
 #include <memory>
 
+#include "session/udp_socket.h"
+
 namespace limn::remote {
 namespace {
 
@@ -31,13 +33,6 @@ bool is_link_local(const std::string& address) {
 
 }  // namespace
 
-bool is_loopback(const std::string& address) {
-  in_addr four{};
-  in6_addr six{};
-  if (inet_pton(AF_INET, address.c_str(), &four) == 1) return ntohl(four.s_addr) >> 24 == 127;
-  return inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_LOOPBACK(&six);
-}
-
 bool is_unspecified(const std::string& address) {
   in_addr four{};
   in6_addr six{};
@@ -54,7 +49,7 @@ std::vector<std::string> own_addresses() {
     if (!at->ifa_addr || (at->ifa_addr->sa_family != AF_INET && at->ifa_addr->sa_family != AF_INET6))
       continue;
     const std::string address = text_of(*at->ifa_addr);
-    if (address.empty() || is_loopback(address) || is_link_local(address)) continue;
+    if (address.empty() || session::is_loopback(address) || is_link_local(address)) continue;
     if (std::find(out.begin(), out.end(), address) == out.end()) out.push_back(address);
   }
   std::stable_partition(out.begin(), out.end(),

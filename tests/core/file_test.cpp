@@ -44,5 +44,17 @@ TEST(WriteTogether, ChangesNothingWhenOneCannotBeWritten) {
   EXPECT_EQ(entries_of(folder), 2);
 }
 
+TEST(WriteTogether, ChangesNothingWhenOneCannotBeReplaced) {
+  const fs::path folder = test::test_folder() / "rig";
+  fs::create_directories(folder / "b" / "inside");
+  ASSERT_TRUE(write_file(folder / "a", "1"));
+  const Status failed = write_two(folder, "3", "4");
+  ASSERT_FALSE(failed);
+  EXPECT_EQ(failed.message().find((folder / "b").string() + ": expected"), 0u) << failed.message();
+  EXPECT_EQ(read_file(folder / "a").value(), "1");
+  EXPECT_TRUE(fs::is_directory(folder / "b" / "inside"));
+  EXPECT_EQ(entries_of(folder), 2);
+}
+
 }  // namespace
 }  // namespace limn

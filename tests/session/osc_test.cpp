@@ -407,6 +407,10 @@ TEST(OscPort, SaysWhatIsWrongWithAPlace) {
   EXPECT_NE(message("", "0").find("--osc-to: expected a port"), std::string::npos);
   EXPECT_NE(message(":9000", "").find("expected an address before the port"), std::string::npos);
   EXPECT_NE(message("somewhere:9000", "").find("expected a numeric address"), std::string::npos);
+  EXPECT_NE(OscPort::open("0", "", "desk").message().find("--osc-from: expected a numeric address"),
+            std::string::npos);
+  EXPECT_NE(OscPort::open("", "", "::1").message().find("--osc-from: expected --osc with it"),
+            std::string::npos);
   EXPECT_NE(message("203.0.113.7:9000", "").find("an address of this machine"), std::string::npos);
   const auto first = OscPort::open("0", "");
   ASSERT_TRUE(first);
