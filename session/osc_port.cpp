@@ -73,7 +73,7 @@ Result<OscPort> OscPort::open(const std::string& receive_at,
 
 void OscPort::apply_edits(Session* session, Telemetry* telemetry, Stamp at) {
   if (!input_) return;
-  std::array<std::uint8_t, k_longest_osc + 1> bytes;
+  std::array<std::uint8_t, k_longest_osc + 1> bytes{};
   const Stamp begun = now();
   for (int i = 0; i < k_most_at_once && now() - begun < k_longest_receiving; ++i) {
     const auto datagram = input_->next(bytes);

@@ -188,7 +188,7 @@ std::string der_of(X509* certificate) {
   unsigned char* bytes = nullptr;
   const int length = i2d_X509(certificate, &bytes);
   LIMN_CHECK(length > 0);
-  const std::string out(bytes, bytes + length);
+  std::string out(bytes, bytes + length);
   OPENSSL_free(bytes);
   return out;
 }
