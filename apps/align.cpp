@@ -26,7 +26,10 @@ Status run_align(const AlignCommand& command) {
   }
   const auto stddev = [&](int i) { return std::sqrt(aligned.registration.covariance(i, i)); };
   print_out(
+      "{:.0f} % of the scan lies within {:.0f} mm of the CAD, and {:.0f} % of the CAD is covered by the "
+      "scan\n"
       "{} of {} points fit within {:.3f} mm RMS; standard deviation {:.3f} mm, {:.4f} degrees; files in {}\n",
+      100 * aligned.overlap.scan_share, 1e3 * aligned.overlap.near_m, 100 * aligned.overlap.mesh_share,
       aligned.registration.used, aligned.registration.near, 1e3 * aligned.registration.rms_m,
       1e3 * std::max({stddev(3), stddev(4), stddev(5)}),
       180 / M_PI * std::max({stddev(0), stddev(1), stddev(2)}), command.out.string());

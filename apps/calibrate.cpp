@@ -133,6 +133,11 @@ Status play(const CalibrateOptions& options,
                   : work(backend, {.say = say}));
   say_end(options, done, say);
   if (options.json) print_out("{}", to_json(done));
+  if (done.report.assessment.verdict == calib::Verdict::reject)
+    return error(
+        "{}: the calibration is rejected. All files are written. Correct what report.html names, and "
+        "calibrate again.",
+        options.out.string());
   return {};
 }
 

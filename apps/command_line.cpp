@@ -650,10 +650,10 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--seconds", options->seconds,
                       "Length in seconds of the session's clock; without it the script's length, or until "
                       "somebody ends the session");
-  command
-      ->add_option("--resolution", options->resolution,
-                   "Scale of the virtual devices' image sides, over 0 and at most 1")
-      ->capture_default_str();
+  command->add_option(
+      "--resolution", options->resolution,
+      "Scale of the virtual devices' image sides, over 0 and at most 1. Without it 1, or with "
+      "--window, --serve or --osc what this machine computes in real time");
   command->add_option("--record", options->record, "Folder for a recording that limn replay can play");
   command->add_option("--out", options->out,
                       "Folder for poses.csv, telemetry.csv, session.html and the last images");
@@ -682,7 +682,11 @@ void add_live(CLI::App& app, Run& run) {
                    "How long unseen markers are extrapolated, in seconds")
       ->capture_default_str();
   command->add_flag("--json", options->json, "Print JSON instead of lines");
-  command->callback([options, &run] { run = [options] { return report_result(run_live(*options)); }; });
+  command->callback([options, &run] {
+    // People and programs that take part in a session live in real time.
+    options->is_real_time = options->window || !options->serve.empty() || !options->osc.empty();
+    run = [options] { return report_result(run_live(*options)); };
+  });
 }
 
 void add_replay(CLI::App& app, Run& run) {

@@ -75,8 +75,9 @@ void print(const tracker::MarkerMap& learned) {
 Status run_learn_body(const LearnBodyOptions& options) {
   if (options.camera.empty())
     return usage_error("--learn-body: poses need a camera; add --camera X.cameramodel.");
-  if (!std::isfinite(options.size_mm) || !(options.size_mm > 0))
-    return usage_error("--size-mm: expected millimetres (> 0), found {}.", options.size_mm);
+  if (!(options.size_mm > 0 && options.size_mm <= k_largest_marker_mm))
+    return usage_error("--size-mm: expected millimetres, over 0 and at most {}, found {}.",
+                       k_largest_marker_mm, options.size_mm);
   if (options.out.extension() != ".json")
     return usage_error("--out: expected a file that ends in .json, found '{}'.", options.out.string());
   LIMN_TRY(const Imager camera, load_imager(options.camera));

@@ -1,7 +1,9 @@
 #include "apps/live.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
+#include <cmath>
 #include <csignal>
 #include <functional>
 #include <limits>
@@ -94,15 +96,34 @@ Result<VirtualSetup> load_virtual_setup(const LiveOptions& options) {
   } else {
     LIMN_TRY(loaded.world, session::room_for(loaded.setup.rig, loaded.setup.scene));
   }
-  if (const Status coarser = scale_resolution(options.resolution, &loaded.world.rig); !coarser)
-    return usage_error("--resolution: {}", coarser.message());
   if (options.rig.empty()) {
     loaded.setup.rig = loaded.world.rig;
     loaded.setup.scene = *loaded.world.scene;
-  } else {
-    LIMN_TRY_STATUS(scale_resolution(options.resolution, &loaded.setup.rig));
   }
   return loaded;
+}
+
+// Makes the rig of world and session as coarse as `share` says.
+Status make_coarser(double share, VirtualSetup* loaded) {
+  LIMN_TRY_STATUS(scale_resolution(share, &loaded->world.rig));
+  return scale_resolution(share, &loaded->setup.rig);
+}
+
+// The largest share of the resolution at which this machine computes at least half of all frames in time. The
+// time of a frame is measured at the smallest share, and taken to grow with the number of pixels.
+Result<double> choose_resolution(const VirtualSetup& loaded, double frame_period_s) {
+  constexpr std::array k_shares = {1.0, 0.75, 0.5, 0.4, 0.3};
+  std::vector<double> shares;
+  for (const double share : k_shares)
+    if (VirtualSetup coarser = loaded; make_coarser(share, &coarser)) shares.push_back(share);
+  const double smallest = shares.back();
+  VirtualSetup coarser = loaded;
+  LIMN_TRY_STATUS(make_coarser(smallest, &coarser));
+  LIMN_TRY(const double frame_s, session::measure_frame_s(coarser.world, coarser.setup));
+  const auto is_fast = [&](double share) {
+    return frame_s * std::pow(share / smallest, 2) <= 2 * frame_period_s;
+  };
+  return *std::find_if(shares.begin(), shares.end() - 1, is_fast);
 }
 
 // A rig is valid only for the devices that it was measured on.
@@ -195,6 +216,15 @@ Status run_session(const LiveOptions& options,
   return output.close(&session, options.json);
 }
 
+void report_resolution(double share, session::Telemetry* telemetry) {
+  const std::string what = fmt::format(
+      "The virtual devices have {:.0f} % of their resolution, so that this machine keeps real time. "
+      "--resolution 1 keeps all of it.",
+      100 * share);
+  log_info("live: {}", what);
+  telemetry->note({}, what);
+}
+
 Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(session::Script script, options.script.empty() ? Result<session::Script>(session::Script{})
                                                           : session::load_script(options.script));
@@ -203,14 +233,18 @@ Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_fits(setup.rig, loaded.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera = !loaded.world.camera_effects.front().srgb;
+  const bool chooses = options.is_real_time && !options.resolution;
+  double share = options.resolution.value_or(1);
+  if (chooses) {
+    LIMN_TRY(share, choose_resolution(loaded, options.frame_period_s));
+  }
+  if (const Status coarser = make_coarser(share, &loaded); !coarser)
+    return usage_error("--resolution: {}", coarser.message());
   log_info("live: no devices are given; the session runs on a virtual rig with its own clock");
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
                                             : std::numeric_limits<double>::infinity();
-  sim::VirtualRig rig(std::move(loaded.world), {.display_delay_s = session::k_virtual_display_s,
-                                                .camera_delay_s = session::k_virtual_camera_s,
-                                                .frame_period_s = options.frame_period_s,
-                                                .grab_waits_for_light = false});
+  sim::VirtualRig rig(std::move(loaded.world), session::virtual_rig_options(options.frame_period_s));
   LIMN_TRY(session::ScriptedRoom room, session::ScriptedRoom::create(std::move(script), &rig));
   std::optional<device::Desktop> desktop;
   if (options.window) {
@@ -218,7 +252,10 @@ Status play_in_virtual_room(const LiveOptions& options) {
   }
   return run_session(options, setup, loaded.skipped_variants, desktop ? &*desktop : nullptr,
                      [&](const session::SessionParts& parts, session::Keys*) {
-                       return session::play_virtually(end_s, g_is_ended, &rig, &room, parts);
+                       if (chooses && share < 1) report_resolution(share, &parts.output.telemetry());
+                       const auto pace =
+                           options.is_real_time ? session::Pace::real_time : session::Pace::repeatable;
+                       return session::play_virtually(end_s, pace, g_is_ended, &rig, &room, parts);
                      });
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 
 #include "core/result.h"
@@ -15,8 +16,11 @@ struct LiveOptions {
   std::filesystem::path devices;  ///< limn.devices/1; empty: the virtual rig.
   std::filesystem::path world;    ///< World of the virtual rig; empty: a room made for rig and scene.
   std::filesystem::path script;
-  double seconds = 0;                ///< Length on the session's clock; 0: until somebody ends it.
-  double resolution = 1;             ///< Scale of the virtual devices' image sides, over 0 and at most 1.
+  double seconds = 0;  ///< Length on the session's clock; 0: until somebody ends it.
+  /// Scale of the virtual devices' image sides, over 0 and at most 1. Without it: 1; in real time what this
+  /// machine can compute.
+  std::optional<double> resolution;
+  bool is_real_time = false;         ///< The virtual rig's clock runs as a clock on the wall.
   double frame_period_s = 1 / 30.0;  ///< Frame period of the virtual rig's cameras.
   std::filesystem::path record;
   std::filesystem::path out;

@@ -292,7 +292,7 @@ Status run_render(const RenderOptions& options) {
   if (options.stereo_mm && options.view.empty())
     return usage_error(
         "--stereo: expected --view VIEWER.json with it, which places the cameras, found none.");
-  if (options.stereo_mm && !(std::abs(*options.stereo_mm) < 1000)) {
+  if (options.stereo_mm && !(*options.stereo_mm > 0 && *options.stereo_mm < 1000)) {
     return usage_error(
         "--stereo: expected a distance of two cameras in millimetres (people's eyes: about 63), found {}.",
         *options.stereo_mm);

@@ -54,6 +54,11 @@ Status run_solve(const wizard::SolveCommandOptions& options, bool is_json) {
     print_report(report);
     print_out("rig and report in {}\n", options.out.string());
   }
+  if (report.assessment.verdict == calib::Verdict::reject)
+    return error(
+        "{}: the calibration is rejected. Rig and report are written. Correct what report.html names, and "
+        "capture again.",
+        options.out.string());
   return {};
 }
 

@@ -117,13 +117,10 @@ std::vector<CapturedDevice> read_devices(const ConfigNode& list, const std::set<
   for (const ConfigNode& node : list.items()) {
     node.only(keys);
     const std::string name = node.at("name").text();
-    const std::vector<double> size = node.at("size").numbers(2);
-    const bool sound =
-        size.size() == 2 && size[0] >= 2 && size[1] >= 2 && size[0] <= 65535 && size[1] <= 65535;
-    if (!sound) node.problem("expected a size of 2 to 65535 pixels a side.");
+    const auto [width, height] = node.at("size").image_size(2);
     if (name.empty() || name.find('/') != std::string::npos || name == ".." || !names.insert(name).second)
       node.problem("expected a name of its own, without slashes, found '" + name + "'.");
-    devices.push_back({name, sound ? static_cast<int>(size[0]) : 2, sound ? static_cast<int>(size[1]) : 2});
+    devices.push_back({name, width, height});
   }
   if (devices.empty()) list.problem("expected at least one device, found none.");
   return devices;

@@ -116,13 +116,19 @@ std::vector<std::string> ConfigNode::keys() const {
 
 double ConfigNode::number() const {
   if (!json_) return 0;
-  if (json_->is_number() && std::isfinite(json_->get<double>())) return json_->get<double>();
-  problem(fmt::format("expected a finite number, found {}.", found(*json_)));
+  const double value = json_->is_number() ? json_->get<double>() : NAN;
+  if (std::abs(value) <= k_largest_number) return value;
+  if (std::isfinite(value))
+    problem(fmt::format("expected a number from {} to {}, found {}.", -k_largest_number, k_largest_number,
+                        value));
+  else
+    problem(fmt::format("expected a finite number, found {}.", found(*json_)));
   return 0;
 }
 
-double ConfigNode::positive() const {
+double ConfigNode::positive(double most) const {
   const double value = number();
+  if (value > most) problem(fmt::format("expected at most {}, found {}.", most, value));
   if (json_ && json_->is_number() && !(value > 0))
     problem(fmt::format("expected a number > 0, found {}.", value));
   return value > 0 ? value : 1;
@@ -172,7 +178,24 @@ std::vector<double> ConfigNode::numbers(int count) const {
 
 Eigen::Vector3d ConfigNode::vector3() const {
   const auto values = numbers(3);
+  for (const double value : values)
+    if (std::abs(value) > k_largest_coordinate)
+      problem(fmt::format("expected three numbers from {} to {}, found {}.", -k_largest_coordinate,
+                          k_largest_coordinate, value));
   return {values[0], values[1], values[2]};
+}
+
+std::array<int, 2> ConfigNode::image_size(int smallest) const {
+  const auto values = numbers(2);
+  if (!json_) return {smallest, smallest};
+  const auto is_side = [&](double value) {
+    return value >= smallest && value <= k_max_side && value == std::floor(value);
+  };
+  if (is_side(values[0]) && is_side(values[1]))
+    return {static_cast<int>(values[0]), static_cast<int>(values[1])};
+  problem(fmt::format("expected [width, height] in whole pixels, each from {} to {}, found {}.", smallest,
+                      k_max_side, found(*json_)));
+  return {smallest, smallest};
 }
 
 Pose ConfigNode::pose() const {

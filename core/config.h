@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
@@ -12,6 +13,11 @@
 #include "core/result.h"
 
 namespace limn {
+
+/// Larger numbers in a file are mistakes; later computations would not stay finite with them.
+inline constexpr double k_largest_number = 1e9;
+/// Metres: no room is larger, and single precision resolves a centimetre at this distance.
+inline constexpr double k_largest_coordinate = 1e5;
 
 /// A value in a JSON file that people edit; it knows its path. A getter returns the value. If that is not
 /// possible, it records the problem, unless the file already has one ("FILE: projectors[0].lens.fx: expected
@@ -30,16 +36,20 @@ class ConfigNode {
   /// Member names of an object, in the file's order.
   std::vector<std::string> keys() const;
 
-  double number() const;    ///< finite
-  double positive() const;  ///< finite and > 0
+  /// A number of at most k_largest_number in magnitude.
+  double number() const;
+  double positive(double most = k_largest_number) const;  ///< > 0, at most `most`.
   int integer() const;
   bool boolean() const;
   std::string text() const;
   /// One of `choices`.
   std::string choice(const std::vector<std::string>& choices) const;
-  /// Array of exactly `count` finite numbers (any number when count < 0).
+  /// Array of exactly `count` numbers as number() takes them (any number when count < 0).
   std::vector<double> numbers(int count) const;
+  /// Three numbers of at most k_largest_coordinate in magnitude: a position (m), a direction, a colour.
   Eigen::Vector3d vector3() const;
+  /// [width, height] in whole pixels, each from `smallest` to k_max_side (core/imager.h).
+  std::array<int, 2> image_size(int smallest = 1) const;
   /// {"rotation_wxyz": [...], "translation_m": [...]}; the quaternion must have unit length within 1e-3.
   Pose pose() const;
   /// A relative path that must stay inside the file's folder; returned joined to that folder.

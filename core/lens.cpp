@@ -204,6 +204,10 @@ Result<Lens> Lens::create(const std::string& model_name, std::vector<double> val
     return error("lens values: expected focal lengths fx, fy in pixels (> 0), found {} and {}.", values[0],
                  values[1]);
   }
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (std::abs(values[i]) > k_largest_lens_px)
+      return error("lens values[{}]: expected at most {} pixels, found {}.", i, k_largest_lens_px, values[i]);
+  }
   return Lens{std::move(model), std::move(values)};
 }
 

@@ -57,12 +57,17 @@ class LensModel {
   explicit LensModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 };
 
+/// Largest focal length and largest coordinate of a principal point, in pixels. A lens of 0.1 degrees on the
+/// largest imager has a tenth of it.
+inline constexpr double k_largest_lens_px = 1e8;
+
 /// A lens: model and values. Pixel (0,0) is the centre of the top-left pixel.
 struct Lens {
   LensModel model;
   std::vector<double> values = {1, 1, 0, 0};
 
-  /// Checks the number of values, that all are finite and that the focal lengths are positive.
+  /// Checks the number of values, that all are finite, that the focal lengths are positive, and that they and
+  /// the principal point are at most k_largest_lens_px.
   static Result<Lens> create(const std::string& model_name, std::vector<double> values);
   static Lens pinhole(double fx, double fy, double cx, double cy);
 

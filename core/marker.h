@@ -8,6 +8,9 @@
 
 namespace limn {
 
+/// Largest side of a marker (mm); larger numbers are mistakes.
+inline constexpr double k_largest_marker_mm = 1e5;
+
 /// A marker's name `family:id`, such as `apriltag_36h11:0`, `aruco_4x4_50:3`, `artoolkit:hiro.patt`. The id
 /// is everything after the last colon, so that `aruco:FILE.yml:7` has the family `aruco:FILE.yml`.
 struct MarkerName {

@@ -242,14 +242,14 @@ Result<ColourMixing> load_mixing(const fs::path& response_json,
     if (node.at("projector").text() != projector || node.at("camera").text() != camera) continue;
     node.only({"projector", "camera", "size", "unit", "red", "green", "blue", "offset", "held_out_levels"});
     ColourMixing mixing{projector, camera, {}, {}, {}, {}, node.at("held_out_levels").number()};
-    const std::vector<double> size = node.at("size").numbers(2);
+    const auto [width, height] = node.at("size").image_size();
     const double unit = node.at("unit").positive();
     const std::array<std::pair<const char*, cv::Mat*>, 4> maps = {
         {{"red", &mixing.red}, {"green", &mixing.green}, {"blue", &mixing.blue}, {"offset", &mixing.offset}}};
     for (const auto& [name, map] : maps) {
       const fs::path path = node.at(name).path_inside();
       LIMN_TRY_STATUS(config.status());
-      LIMN_TRY(*map, load_map(path, unit, static_cast<int>(size[0]), static_cast<int>(size[1])));
+      LIMN_TRY(*map, load_map(path, unit, width, height));
     }
     return mixing;
   }

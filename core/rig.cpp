@@ -21,16 +21,9 @@ Imager read_imager(const ConfigNode& node, bool is_projector) {
     node.only({"name", "size", "lens", "imager_from_world"});
   Imager imager;
   imager.name = node.at("name").text();
-  const ConfigNode size = node.at("size");
-  const auto pixels = size.items();
-  if (pixels.size() == 2) {
-    imager.width = pixels[0].integer();
-    imager.height = pixels[1].integer();
-  }
-  const auto sound = [](int side) { return side > 0 && side <= k_max_side; };
-  if (pixels.size() != 2 || !sound(imager.width) || !sound(imager.height)) {
-    size.problem(fmt::format("expected [width, height] in pixels, both from 1 to {}.", k_max_side));
-  }
+  const auto [width, height] = node.at("size").image_size();
+  imager.width = width;
+  imager.height = height;
   const ConfigNode lens = node.at("lens");
   lens.only({"model", "values"});
   auto made = Lens::create(lens.at("model").text(), lens.at("values").numbers(-1));

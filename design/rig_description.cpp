@@ -29,12 +29,9 @@ Vector3d place_of(const ConfigNode& node, const Vector3d& p_centre) {
 Imager imager_of(const ConfigNode& node, const Vector3d& p_centre) {
   Imager imager;
   imager.name = node.at("name").text();
-  const auto size = node.at("size").numbers(2);
-  imager.width = static_cast<int>(size[0]);
-  imager.height = static_cast<int>(size[1]);
-  if (imager.width < 16 || imager.height < 16 || imager.width > 20000 || imager.height > 20000)
-    node.at("size").problem(
-        fmt::format("expected 16 to 20000 pixels each way, found {} x {}.", size[0], size[1]));
+  const auto [width, height] = node.at("size").image_size(16);
+  imager.width = width;
+  imager.height = height;
   double focal = 1;
   const auto fov = node.find("fov_deg"), throw_ratio = node.find("throw");
   if (fov.has_value() == throw_ratio.has_value()) {

@@ -18,11 +18,8 @@ std::optional<double> positive_of(const ConfigNode& node, const std::string& key
 cv::Size size_of(const ConfigNode& node) {
   const auto found = node.find("size");
   if (!found) return {};
-  const auto values = found->numbers(2);
-  const cv::Size size(static_cast<int>(values[0]), static_cast<int>(values[1]));
-  if (size.width < 1 || size.height < 1 || size.width != values[0] || size.height != values[1])
-    found->problem("expected [width, height] in pixels.");
-  return size;
+  const auto [width, height] = found->image_size();
+  return {width, height};
 }
 
 // Paths are relative to the devices file; addresses stay unchanged.

@@ -111,8 +111,9 @@ cv::Mat MisalignmentDetector::predicted_light(std::size_t projector, const cv::M
 void MisalignmentDetector::begin(const Frame& frame,
                                  std::span<const cv::Mat> shown,
                                  std::span<const cv::Mat> before,
-                                 std::span<const std::vector<cv::Point>> avoid) {
+                                 const cv::Mat& avoid) {
   LIMN_CHECK(frame.image.cols == imager_.width && frame.image.rows == imager_.height);
+  LIMN_CHECK(avoid.size() == frame.image.size() && avoid.type() == CV_8U);
   LIMN_CHECK(shown.size() == lights_.size() && before.size() == lights_.size());
   cells_.clear();
   if (patches_.points.empty()) return;
@@ -131,12 +132,9 @@ void MisalignmentDetector::begin(const Frame& frame,
     cv::extractChannel(patches_.by_projector[i], irradiance, 2);
     reached += irradiance;
   }
-  usable = reached > 0;
-  for (const std::vector<cv::Point>& corners : avoid) {
-    std::vector<cv::Point> scaled;
-    for (const cv::Point& corner : corners) scaled.push_back(corner / side_px_);
-    cv::fillConvexPoly(usable, scaled, cv::Scalar(0));
-  }
+  cv::Mat left_out;
+  cv::resize(avoid(whole), left_out, size, 0, 0, cv::INTER_AREA);
+  usable = (reached > 0) & (left_out == 0);
   white_ = cv::mean(reached, usable)[0];
   std::vector<std::pair<double, cv::Rect>> found;
   for (int y = k_reach; y + k_cell + k_reach <= size.height; y += k_cell)

@@ -55,12 +55,12 @@ class MisalignmentDetector {
   bool is_comparing() const { return !cells_.empty(); }
   /// Begins the comparison with a frame (8-bit grey or BGR of the camera's size). `shown` and `before` are
   /// the images that each projector showed during the exposure and shortly before it (8-bit BGR; empty:
-  /// black). `avoid`: quadrilaterals of the frame that are left out (markers, because paper has edges of its
-  /// own). Nothing happens before place().
+  /// black). `avoid` (CV_8U, of the camera's size): not 0 where the frame is left out (markers, because paper
+  /// has edges of its own). Nothing happens before place().
   void begin(const Frame& frame,
              std::span<const cv::Mat> shown,
              std::span<const cv::Mat> before,
-             std::span<const std::vector<cv::Point>> avoid);
+             const cv::Mat& avoid);
   /// Compares some cells; returns true when the frame is finished.
   bool compare(int cells);
 

@@ -27,7 +27,7 @@ Result<std::vector<BodyMarker>> load_marker_file(const std::filesystem::path& pa
     }
     if (!names.insert(*name).second)
       node.at("name").problem(fmt::format("expected each marker once, found {} twice.", name->text()));
-    markers.push_back({*name, 1e-3 * node.at("size_mm").positive(),
+    markers.push_back({*name, 1e-3 * node.at("size_mm").positive(k_largest_marker_mm),
                        node.at(is_body ? "body_from_marker" : "prototype_from_marker").pose()});
   }
   if (markers.empty()) root.at("markers").problem("expected at least one marker, found none.");

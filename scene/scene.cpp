@@ -61,7 +61,7 @@ MeshFile read_mesh_file(const ConfigNode& node) {
   return {mesh.where(), mesh.path_inside(), k_length_units.read(node.at("units"))};
 }
 
-double read_size_m(const ConfigNode& node) { return node.at("size_mm").positive() * 1e-3; }
+double read_size_m(const ConfigNode& node) { return node.at("size_mm").positive(k_largest_marker_mm) * 1e-3; }
 
 void read_albedo(const ConfigNode& node, Prototype* prototype, Reader* reader) {
   if (node.is_string()) {
@@ -168,26 +168,17 @@ Control read_control(const ConfigNode& node, const Scene& scene) {
   return control;
 }
 
-int read_side(const ConfigNode& size, double value) {
-  constexpr double k_most = 16384;  // GL 4.5 guarantees textures of this size
-  if (value >= 1 && value <= k_most && value == static_cast<int>(value)) return static_cast<int>(value);
-  size.problem(fmt::format("expected a whole number of pixels from 1 to {}, found {}.", k_most, value));
-  return 1;
-}
-
 Imager read_viewer_imager(const ConfigNode& node) {
   node.only({"schema", "world_from_viewer", "size", "fov_deg"});
   const Pose world_from_viewer = node.at("world_from_viewer").pose();
-  const ConfigNode size = node.at("size");
-  std::vector<double> sides = size.numbers(2);
-  sides.resize(2, 1);
+  const auto [width, height] = node.at("size").image_size();
   double fov_deg = node.at("fov_deg").positive();
   if (fov_deg >= 180) {
     node.at("fov_deg").problem(fmt::format("expected less than 180 degrees, found {}.", fov_deg));
     fov_deg = 60;
   }
   if (!(fov_deg > 0)) fov_deg = 60;  // the problem is already recorded
-  return viewer_imager(world_from_viewer, read_side(size, sides[0]), read_side(size, sides[1]), fov_deg);
+  return viewer_imager(world_from_viewer, width, height, fov_deg);
 }
 
 // A guest's name, or true for every guest.
@@ -215,7 +206,7 @@ Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
                                                                                                     : "all"));
   }
   if (const auto size = node.find("size_mm"))
-    viewer.marker_size_m = 1e-3 * size->positive();
+    viewer.marker_size_m = 1e-3 * size->positive(k_largest_marker_mm);
   else if (!scene.slots.empty())
     viewer.marker_size_m = scene.slots[0].size_m;
   if (const auto eye = node.find("eye_mm")) viewer.p_eye_marker = 1e-3 * eye->vector3();

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "session/stillness.h"
+#include "tracker/marker_light.h"
 
 namespace limn::session {
 namespace {
@@ -21,9 +23,13 @@ constexpr double k_least_correlation = 0.3;
 constexpr double k_least_gain = 0.1;
 constexpr double k_as_good = 0.92;  // devices with this share of the best gain explain it equally well
 
-// The outlines of markers with their paper, in pixels.
-std::vector<std::vector<cv::Point>> papers(const std::vector<tracker::Detection>& detections) {
-  std::vector<std::vector<cv::Point>> out;
+// Where a camera's image shows the paper of markers: of those that it detected, and of those that are too
+// small, too dark or too blurred for that, but are on a tracked body.
+cv::Mat papers(const Imager& camera,
+               const std::vector<tracker::Detection>& detections,
+               std::span<const Body> bodies,
+               std::span<const Track> tracks) {
+  cv::Mat mask = tracker::marker_mask(camera, bodies, tracks, {.margin = (k_paper - 1) / 2});
   for (const tracker::Detection& detection : detections) {
     Eigen::Vector2d middle = Eigen::Vector2d::Zero();
     for (const auto& corner : detection.corners_px) middle += 0.25 * corner;
@@ -32,9 +38,9 @@ std::vector<std::vector<cv::Point>> papers(const std::vector<tracker::Detection>
       const Eigen::Vector2d p = middle + k_paper * (corner - middle);
       corners.emplace_back(cvRound(p.x()), cvRound(p.y()));
     }
-    out.push_back(std::move(corners));
+    cv::fillConvexPoly(mask, corners, cv::Scalar(255));
   }
-  return out;
+  return mask;
 }
 
 }  // namespace
@@ -64,6 +70,8 @@ DriftWatch::DriftWatch(const Rig& rig) : rig_(rig) {
 
 void DriftWatch::compare(const Percepts& percepts,
                          const scene::PosedScene& posed,
+                         std::span<const Body> bodies,
+                         std::span<const Track> tracks,
                          const ProjectionHistory& shown,
                          projector::Renderer* renderer) {
   if (!posed.world_from_prototype || lights_.empty()) return;
@@ -93,7 +101,8 @@ void DriftWatch::compare(const Percepts& percepts,
   const auto* now = shown.at(frame.captured_at);
   const auto* before = shown.at(shifted(frame.captured_at, -k_before_s));
   if (!now || !before) return;
-  lights_[turn_].begin(frame, *now, *before, papers(percepts.detections[turn_]));
+  lights_[turn_].begin(frame, *now, *before,
+                       papers(rig_.cameras[turn_], percepts.detections[turn_], bodies, tracks));
 }
 
 // Finds the device whose motion explains best what all cameras see; nullopt if no motion explains it better

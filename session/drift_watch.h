@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -49,8 +50,12 @@ class DriftWatch {
  public:
   explicit DriftWatch(const Rig& rig);
 
+  /// Compares some cells of the newest frames. `posed` and `tracks` (of `bodies`) are what the light shown
+  /// now was drawn for.
   void compare(const Percepts& percepts,
                const scene::PosedScene& posed,
+               std::span<const Body> bodies,
+               std::span<const Track> tracks,
                const ProjectionHistory& shown,
                projector::Renderer* renderer);
 

@@ -204,7 +204,7 @@ std::optional<std::size_t> FrameComposer::best_projector(const Pose& world_from_
 }
 
 void FrameComposer::check_drift(const Percepts& percepts) {
-  drifts_.compare(percepts, composed_.posed, shown_, &renderer_);
+  drifts_.compare(percepts, composed_.posed, bodies_, composed_.tracks, shown_, &renderer_);
 }
 
 cv::Mat FrameComposer::screen(const Percepts& percepts,

@@ -68,6 +68,15 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const
     return error(
         "{}: expected a folder without a session, found one. Name another folder; nothing was changed.",
         folder.string());
+  std::error_code ignored;
+  const bool is_fresh = !fs::exists(folder, ignored) || fs::is_empty(folder, ignored);
+  auto begun = begin(folder, setup);
+  if (!begun && is_fresh)
+    for (const auto& entry : fs::directory_iterator(folder, ignored)) fs::remove_all(entry.path(), ignored);
+  return begun;
+}
+
+Result<std::unique_ptr<Recorder>> Recorder::begin(const fs::path& folder, const SessionSetup& setup) {
   LIMN_TRY_STATUS(make_folder(folder));
   LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
   LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));

@@ -36,7 +36,7 @@ struct SessionSetup {
 /// several threads.
 class Recorder {
  public:
-  /// Error: the folder cannot be written, or holds a session already.
+  /// Error: the folder cannot be written, or holds a session already. Then the folder is as it was.
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& folder,
                                                   const SessionSetup& setup);
 
@@ -62,6 +62,9 @@ class Recorder {
 
  private:
   explicit Recorder(const std::filesystem::path& folder);
+  // Writes the setup and opens the log; on an error parts of it may be in the folder.
+  static Result<std::unique_ptr<Recorder>> begin(const std::filesystem::path& folder,
+                                                 const SessionSetup& setup);
   void write(const nlohmann::ordered_json& event);  // call with mutex_ held
   void end(const std::string& why);                 // call with mutex_ held
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double k_never_s = 1e9;
 constexpr double k_most_periods = 1000;
-constexpr double k_largest_side_px = 16384, k_largest_step_s = 1e6;
+constexpr double k_largest_step_s = 1e6;
 constexpr double k_hand_albedo = 0.35;
 constexpr double k_hand_above_m = 0.006;
 // A hand in a projector's light: its place as a share of the way to the prototype's middle, and its size.
@@ -39,11 +39,8 @@ void read_span(const ConfigNode& node, double* from_s, double* until_s) {
 }
 
 cv::Size size_of(const ConfigNode& node) {
-  const std::vector<double> size = node.numbers(2);
-  for (const double side : size)
-    if (side != std::round(side) || side < 1 || side > k_largest_side_px)
-      node.problem(fmt::format("expected whole pixels from 1 to {}, found {}.", k_largest_side_px, side));
-  return size.size() == 2 ? cv::Size(static_cast<int>(size[0]), static_cast<int>(size[1])) : cv::Size();
+  const auto [width, height] = node.image_size();
+  return {width, height};
 }
 
 scene::Edit read_edit(const ConfigNode& node) {

@@ -15,15 +15,16 @@ namespace fs = std::filesystem;
 constexpr const char* k_pairings = "pairings.json";
 constexpr const char* k_deleted = "deleted";  // subfolder of the folder of looks
 
-// Moves a look's files; a file that does not exist is skipped.
+// Moves a look's files, both or none; a file that does not exist is skipped.
 Status move_look(const std::string& name, const fs::path& from, const fs::path& to) {
   LIMN_TRY_STATUS(make_folder(to));
-  std::error_code failed;
+  std::error_code failed, ignored;
   for (const char* end : {".json", ".png"}) {
     const fs::path file = from / (name + end);
     if (fs::exists(file, failed)) fs::rename(file, to / file.filename(), failed);
-    if (failed)
-      return error("{}: could not be moved to {}: {}.", file.string(), to.string(), failed.message());
+    if (!failed) continue;
+    if (end == std::string(".png")) fs::rename(to / (name + ".json"), from / (name + ".json"), ignored);
+    return error("{}: could not be moved to {}: {}.", file.string(), to.string(), failed.message());
   }
   return {};
 }
@@ -32,9 +33,10 @@ Status write_look(const fs::path& folder,
                   const std::string& name,
                   const std::string& json,
                   const cv::Mat& image) {
-  LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY_STATUS(write_file(folder / (name + ".json"), json));
-  return image.empty() ? Status() : write_png(folder / (name + ".png"), image);
+  return write_together(folder, [&](const fs::path& into) -> Status {
+    LIMN_TRY_STATUS(write_file(into / (name + ".json"), json));
+    return image.empty() ? Status() : write_png(into / (name + ".png"), image);
+  });
 }
 
 // The JSON text of a look; empty: there is no such look.

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <optional>
+#include <thread>
 
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "device/gl_context.h"
 #include "session/frame_gate.h"
 #include "session/scene_files_client.h"
 #include "wizard/capture/virtual_backend.h"
@@ -63,16 +66,40 @@ class VirtualClock final : public FrameClock {
   const sim::VirtualRig* rig_;
 };
 
+// Makes the rig's clock follow the wall clock from the first call on.
+class RealTime {
+ public:
+  void keep(sim::VirtualRig* rig) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!begun_) begun_ = Begin{now, rig->now()};
+    const double ahead_s = seconds_between(begun_->clock, rig->now()) -
+                           std::chrono::duration<double>(now - begun_->wall).count();
+    if (ahead_s > 0)
+      std::this_thread::sleep_for(std::chrono::duration<double>(ahead_s));
+    else
+      rig->advance(-ahead_s);
+  }
+
+ private:
+  struct Begin {
+    std::chrono::steady_clock::time_point wall;
+    Stamp clock;
+  };
+  std::optional<Begin> begun_;
+};
+
 // Each perception uses the room's next exposure; edits come from the script.
 class VirtualSource final : public FrameSource {
  public:
   VirtualSource(double end_s,
+                Pace pace,
                 sim::VirtualRig* rig,
                 ScriptedRoom* room,
                 Perception* perception,
                 Recorder* recorder,
                 DeviceHealth* health)
       : end_s_(end_s), rig_(rig), room_(room), perception_(perception), recorder_(recorder), health_(health) {
+    if (pace == Pace::real_time) real_time_.emplace();
     for (const Imager& camera : rig->world().rig.cameras) {
       cameras_.push_back(health->add({camera.name, "camera"}));
       gates_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), health);
@@ -82,6 +109,7 @@ class VirtualSource final : public FrameSource {
   bool is_over() const override { return !is_paused_ && seconds_of(rig_->next_exposure()) > end_s_; }
 
   Result<Perceived> perceive() override {
+    if (real_time_) real_time_->keep(rig_);
     exposed_at_ = rig_->next_exposure();
     room_->set(seconds_of(exposed_at_));
     const std::vector<Frame> frames = exposed();
@@ -135,6 +163,7 @@ class VirtualSource final : public FrameSource {
   DeviceHealth* health_;
   std::vector<std::size_t> cameras_;  // in health_
   std::vector<FrameGate> gates_;      // one per entry of cameras_
+  std::optional<RealTime> real_time_;
   Stamp exposed_at_;
   std::size_t moments_ = 0, edited_ = 0;
   bool is_paused_ = false;
@@ -199,27 +228,68 @@ class VirtualCapture final : public CaptureDevices {
   const wizard::Plan no_board_{};
 };
 
-}  // namespace
-
-Status play_virtually(double end_s,
-                      const std::atomic<bool>& is_ended,
-                      sim::VirtualRig* rig,
-                      ScriptedRoom* room,
-                      const SessionParts& parts) {
+// Runs the loop; `each_frame` is called after every frame.
+Status play(double end_s,
+            Pace pace,
+            const std::atomic<bool>& is_ended,
+            sim::VirtualRig* rig,
+            ScriptedRoom* room,
+            const SessionParts& parts,
+            const std::function<void()>& each_frame) {
   DeviceHealth health;
   VirtualClock clock(rig);
-  VirtualSource source(end_s, rig, room, &parts.perception, parts.output.recorder(), &health);
+  VirtualSource source(end_s, pace, rig, room, &parts.perception, parts.output.recorder(), &health);
   VirtualSink sink(rig, room, &parts.session, &health);
   VirtualCapture capture(rig, &source);
   SceneFilesClient files(parts.session.setup().scene.folder);
   SessionParts with_own = parts;
   with_own.clients.insert(with_own.clients.begin(), &files);
   FrameLoop loop(std::move(with_own), {clock, source, sink, health, &capture});
+  return loop.run(is_ended, each_frame);
+}
+
+}  // namespace
+
+sim::VirtualRigOptions virtual_rig_options(double frame_period_s) {
+  return {.display_delay_s = k_virtual_display_s,
+          .camera_delay_s = k_virtual_camera_s,
+          .frame_period_s = frame_period_s,
+          .grab_waits_for_light = false};
+}
+
+Status play_virtually(double end_s,
+                      Pace pace,
+                      const std::atomic<bool>& is_ended,
+                      sim::VirtualRig* rig,
+                      ScriptedRoom* room,
+                      const SessionParts& parts) {
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
-  return loop.run(is_ended, [&] {
+  return play(end_s, pace, is_ended, rig, room, parts, [&] {
     if (progress) progress->step(static_cast<int>(seconds_of(rig->now())));
   });
+}
+
+Result<double> measure_frame_s(const sim::World& world, SessionSetup setup) {
+  constexpr int k_frames = 3;  // that prepare everything, and as many that are measured
+  constexpr double k_period_s = 1 / 30.0;
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  sim::VirtualRig rig(world, virtual_rig_options(k_period_s));
+  LIMN_TRY(ScriptedRoom room, ScriptedRoom::create({}, &rig));
+  LIMN_TRY(SessionOutput output, SessionOutput::open({}, {}, &setup));
+  LIMN_TRY(Perception perception, Perception::create(setup.scene, setup.rig, setup.watch));
+  LIMN_TRY(Session session, Session::create(setup, &output.telemetry(), nullptr, false));
+  const SessionParts parts{perception, session, output, {}};
+  const std::atomic<bool> is_ended = false;
+  const auto play_until = [&](double end_s) {
+    return play(end_s, Pace::repeatable, is_ended, &rig, &room, parts, [] {});
+  };
+  LIMN_TRY_STATUS(play_until(k_frames * k_period_s));
+  const Stamp from = rig.now();
+  const auto begun = std::chrono::steady_clock::now();
+  LIMN_TRY_STATUS(play_until(seconds_of(from) + k_frames * k_period_s));
+  const double frames = std::max(1.0, std::round(seconds_between(from, rig.now()) / k_period_s));
+  return 1e-3 * milliseconds_since(begun) / frames;
 }
 
 }  // namespace limn::session

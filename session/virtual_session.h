@@ -13,12 +13,26 @@ namespace limn::session {
 /// it.
 constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
 
-/// Runs a session on a virtual rig, on its clock: nothing sleeps, and every run is the same. Each frame is
-/// made of one exposure. Ends at `end_s` of the clock, when `is_ended` is set, or when a client ends it.
+/// How the virtual rig's clock runs.
+enum class Pace {
+  repeatable,  ///< From frame to frame, as fast as the machine can: nothing sleeps, and every run is the
+               ///< same.
+  real_time,   ///< As a clock on the wall. A slow machine leaves frames out, a fast one waits.
+};
+
+sim::VirtualRigOptions virtual_rig_options(double frame_period_s);
+
+/// Runs a session on a virtual rig, on its clock. Each frame is made of one exposure. Ends at `end_s` of the
+/// clock, when `is_ended` is set, or when a client ends it.
 Status play_virtually(double end_s,
+                      Pace pace,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
                       ScriptedRoom* room,
                       const SessionParts& parts);
+
+/// Seconds that this machine needs for one frame of a session in this world, measured by playing some. The
+/// world's rig and the setup's have the same resolution. Needs no OpenGL context and leaves none.
+Result<double> measure_frame_s(const sim::World& world, SessionSetup setup);
 
 }  // namespace limn::session

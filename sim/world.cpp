@@ -19,12 +19,6 @@ struct MarkerPaper {
   double margin = 0.15;
 };
 
-int side_px(const ConfigNode& node, double value) {
-  if (value >= 1 && value <= 16384 && value == std::floor(value)) return static_cast<int>(value);
-  node.problem(fmt::format("expected a whole number of pixels from 1 to 16384, found {}.", value));
-  return 1;
-}
-
 double share(const ConfigNode& node) {
   const double value = node.number();
   if (value < 0 || value > 1) node.problem(fmt::format("expected a share from 0 to 1, found {}.", value));
@@ -75,11 +69,9 @@ Imager read_imager(const ConfigNode& node) {
         "expected a name without slashes that does not begin with a dot (files are named after it), found "
         "'{}'.",
         imager.name));
-  const ConfigNode size = node.at("size");
-  std::vector<double> sides = size.numbers(2);
-  sides.resize(2, 1);
-  imager.width = side_px(size, sides[0]);
-  imager.height = side_px(size, sides[1]);
+  const auto [width, height] = node.at("size").image_size();
+  imager.width = width;
+  imager.height = height;
   imager.lens = read_lens(node.at("lens"));
   imager.imager_from_world = read_imager_pose(node);
   return imager;
@@ -272,7 +264,7 @@ std::vector<LoosePlace> read_loose_places(const ConfigNode& node) {
     const auto name = MarkerName::parse(item.at("name").text());
     if (!name) item.at("name").problem(name.message());
     const auto on_prototype = item.find("prototype_from_marker");
-    places.push_back({{name ? *name : MarkerName{}, 1e-3 * item.at("size_mm").positive(),
+    places.push_back({{name ? *name : MarkerName{}, 1e-3 * item.at("size_mm").positive(k_largest_marker_mm),
                        on_prototype ? on_prototype->pose() : item.at("world_from_marker").pose()},
                       on_prototype.has_value()});
   }

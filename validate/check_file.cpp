@@ -17,17 +17,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-int side_px(const ConfigNode& node, double value) {
-  if (value >= 1 && value <= 16384 && value == std::floor(value)) return static_cast<int>(value);
-  node.problem(fmt::format("expected a whole number of pixels from 1 to 16384, found {}.", value));
-  return 1;
-}
-
 // Reads a viewer as in a viewer file, or with eye_m and target_m instead of the pose.
 Imager read_imager(const ConfigNode& node) {
-  std::vector<double> size = node.at("size").numbers(2);
-  size.resize(2, 1);
-  const int width = side_px(node.at("size"), size[0]), height = side_px(node.at("size"), size[1]);
+  const auto [width, height] = node.at("size").image_size();
   double fov_deg = node.at("fov_deg").positive();
   if (fov_deg >= 180) {
     node.at("fov_deg").problem(fmt::format("expected an angle below 180 degrees, found {}.", fov_deg));

@@ -225,7 +225,7 @@ Result<Patterns> load_patterns(const std::filesystem::path& path) {
   std::set<std::string> keys = code_option_keys(code);
   keys.merge(std::set<std::string>{"schema", "code", "size", "pictures"});
   root.only(keys);
-  const std::vector<double> size = root.at("size").numbers(2);
+  const auto [width, height] = root.at("size").image_size();
   const int images = root.at("pictures").integer();
   CodeOptions options = read_code_options(root);
   if (const auto response = root.find("response")) {
@@ -234,7 +234,7 @@ Result<Patterns> load_patterns(const std::filesystem::path& path) {
                                      response->at("blue").numbers(-1)};
   }
   LIMN_TRY_STATUS(config.status());
-  const auto patterns = Patterns::create(code, static_cast<int>(size[0]), static_cast<int>(size[1]), options);
+  const auto patterns = Patterns::create(code, width, height, options);
   if (!patterns) return error("{}: {}", path.string(), patterns.message());
   if (images != patterns->count())
     return error("{}: pictures: expected {} for {}x{} {} code, found {}.", path.string(), patterns->count(),

@@ -129,7 +129,9 @@ void note_overlap(const Observations& observations,
          fmt::format(
              "{} illuminates {:.0f} % of the boards' area that cameras see, with {:.0f} % of its pixels",
              devices[i].name, 100 * lit, 100 * devices[i].coverage),
-         "turn projector and camera towards the same place, or hold the board where both reach it"});
+         "turn projector and camera towards the same place, or hold the board where both reach it",
+         // The held-out and predicted errors contain what it costs.
+         Severity::note});
   }
 }
 

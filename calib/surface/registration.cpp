@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 #include <opencv2/core.hpp>
+#include <set>
 #include <tuple>
 
 #include "core/linear_algebra.h"
@@ -31,8 +32,12 @@ constexpr double k_settled_m = 1e-7;  // step, at the mesh's radius
 constexpr double k_held = 1e-6;       // share of the largest eigenvalue; below it rounding dominates
 // RMS residual per step; below it, a form error of a tenth of a millimetre moves the fit by 3 mm.
 constexpr double k_sensitive = 0.03;
-constexpr double k_loose_m = 0.5e-3;    // standard deviation that deserves a warning
-constexpr double k_free_m = 1;          // standard deviation along free directions
+constexpr double k_loose_m = 0.5e-3;  // standard deviation that deserves a warning
+constexpr double k_free_m = 1;        // standard deviation along free directions
+// Distance that counts as near, as a share of the mesh's diagonal and in metres, and the least shares of scan
+// and mesh that are near where both are of one object.
+constexpr double k_near = 0.01, k_least_near_m = 3e-3;
+constexpr double k_least_scan_share = 0.25, k_least_mesh_share = 0.25;
 constexpr double k_cluster = 1 / 20.0;  // share of the mesh's diagonal: errors within it count as shared
 
 double diagonal(const std::vector<Eigen::Vector3f>& positions) {
@@ -647,6 +652,54 @@ std::vector<float> residuals(const scene::MeshBvh& index,
     }
   });
   return out;
+}
+
+Overlap overlap(const scene::Mesh& mesh,
+                const scene::MeshBvh& index,
+                const scene::ScanSurface& scan,
+                const Pose& world_from_prototype,
+                const RegistrationOptions& options) {
+  Overlap out;
+  const double size = diagonal(mesh.positions), cell = options.cell * size;
+  out.near_m = std::max(k_least_near_m, k_near * size);
+  const auto points = thinned(scan, cell);
+  out.scan_points = static_cast<int>(points.size());
+  const std::vector<Row> rows = rows_at(index, points, world_from_prototype, out.near_m);
+  out.scan_share = static_cast<double>(rows.size()) / std::max(1, out.scan_points);
+
+  // The mesh's area by cells of the same size, and which of them have a scan point.
+  std::set<Cell> scanned;
+  const Pose inverse = world_from_prototype.inverse();
+  for (const Row& row : rows)
+    if (const auto nearest = index.nearest(inverse * row.p, 2 * out.near_m))
+      scanned.insert(cell_of(nearest->p, 2 * cell));
+  double area = 0, near = 0;
+  for (const auto& [i, j, k] : mesh.triangles) {
+    const Vector3d a = mesh.positions[i].cast<double>(), ab = mesh.positions[j].cast<double>() - a,
+                   ac = mesh.positions[k].cast<double>() - a;
+    const double own = ab.cross(ac).norm() / 2;
+    // A large triangle is judged at many places, evenly spread over it (Roberts' R2 sequence).
+    const int places = std::clamp(static_cast<int>(own / (cell * cell)), 1, 10'000);
+    for (int n = 0; n < places; ++n) {
+      double u = std::fmod(0.5 + 0.7548776662466927 * n, 1), v = std::fmod(0.5 + 0.5698402909980532 * n, 1);
+      if (u + v > 1) u = 1 - u, v = 1 - v;
+      area += own / places;
+      if (scanned.contains(cell_of(a + u * ab + v * ac, 2 * cell))) near += own / places;
+    }
+  }
+  out.mesh_share = area > 0 ? near / area : 0;
+  return out;
+}
+
+Status check_overlap(const Overlap& overlap) {
+  if (overlap.scan_share >= k_least_scan_share || overlap.mesh_share >= k_least_mesh_share) return {};
+  return error(
+      "only {:.0f} % of the scan lies within {:.0f} mm of the CAD, and only {:.0f} % of the CAD's surface is "
+      "covered by the scan: expected at least {:.0f} % of one of them. Is this the CAD of the scanned "
+      "object? "
+      "If so, check --units, scan more of it, cut the background off (limn scan --far, --pieces), or give "
+      "another --start.",
+      100 * overlap.scan_share, 1e3 * overlap.near_m, 100 * overlap.mesh_share, 100 * k_least_scan_share);
 }
 
 std::vector<Difference> differences(const scene::ScanSurface& scan,

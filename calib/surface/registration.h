@@ -87,6 +87,26 @@ std::vector<float> residuals(const scene::MeshBvh& index,
                              const Registration& registration,
                              double reach_m);
 
+/// How much of the scan and of the mesh lie on each other.
+struct Overlap {
+  double scan_share = 0;  ///< of the scan's points, one for each cell of the fit, near the mesh
+  double mesh_share = 0;  ///< of the mesh's area, near the scan; at most about half for a scan of one side
+  double near_m = 0;      ///< the distance that counts as near: 1 % of the mesh's diagonal, at least 3 mm
+  int scan_points = 0;    ///< number of points that scan_share is a share of
+};
+
+/// Measures it at the registration's pose. Near means on the same side of both surfaces, too.
+Overlap overlap(const scene::Mesh& mesh,
+                const scene::MeshBvh& index,
+                const scene::ScanSurface& scan,
+                const Pose& world_from_prototype,
+                const RegistrationOptions& options = {});
+
+/// Whether this is a registration of one object: fails when little of the scan lies on the mesh and little of
+/// the mesh on the scan, as it is for another object. A scan of a whole room passes by the mesh's share, a
+/// scan of a detail by the scan's.
+Status check_overlap(const Overlap& overlap);
+
 /// A connected region of the scan that differs from the mesh.
 struct Difference {
   Eigen::Vector3d p_prototype = Eigen::Vector3d::Zero();  ///< centre of the region

@@ -9,14 +9,19 @@ namespace limn::remote {
 
 Status TabletWindows::update_window(const std::shared_ptr<WsClient>& client, const WindowMessage& message) {
   if (message.on && !providers_->draw_window) return error("this session has no window.");
-  const auto windows = std::count_if(clients_->begin(), clients_->end(), [&](const auto& other) {
-    return other != client && other->window.is_open();
-  });
-  if (message.on && windows >= k_max_windows) return error("{} windows are open; no more at once.", windows);
   if (!message.on) {
     close_window(client);
     return {};
   }
+  std::ptrdiff_t windows = 0, own = 0;
+  for (const auto& other : *clients_) {
+    if (other == client || !other->window.is_open()) continue;
+    ++windows;
+    own += other->guest.name == client->guest.name;
+  }
+  if (windows >= k_max_windows) return error("{} windows are open; no more at once.", windows);
+  if (own >= k_max_windows_of_guest)
+    return error("{} of your windows are open; close one of them first.", own);
   if (!client->window.is_open()) tablets_[client->guest.name] = {client, Clock::now()};
   client->window.device = message.device;
   client->window.parts = message.parts;

@@ -25,11 +25,11 @@ Result<std::vector<calib::IntrinsicsEstimate>> read(const fs::path& file) {
   for (const ConfigNode& node : config.root().at("lenses").items()) {
     node.only({"size", "values", "covariance", "views"});
     calib::IntrinsicsEstimate lens;
-    const std::vector<double> size = node.at("size").numbers(2), values = node.at("values").numbers(5),
+    const auto [width, height] = node.at("size").image_size();
+    const std::vector<double> values = node.at("values").numbers(5),
                               covariance = node.at("covariance").numbers(25);
-    if (size.size() != 2 || values.size() != 5 || covariance.size() != 25) break;  // status() has the error
-    lens.width = static_cast<int>(std::clamp(size[0], 0.0, 1e5));
-    lens.height = static_cast<int>(std::clamp(size[1], 0.0, 1e5));
+    lens.width = width;
+    lens.height = height;
     lens.values = Eigen::Map<const calib::Vector5d>(values.data());
     lens.covariance = Eigen::Map<const calib::Matrix5d>(covariance.data());
     lens.views = node.at("views").integer();

@@ -12,6 +12,8 @@
 #include "sim/truth.h"
 #include "sim/world.h"
 #include "tests/support/matchers.h"
+#include "tests/support/meshes.h"
+#include "tests/support/text.h"
 #include "tests/support/worlds.h"
 
 namespace limn::calib {
@@ -138,6 +140,48 @@ TEST(Align, FindsTheDoorFromAnyPoseWithoutAStart) {
     EXPECT_TRUE(pose_near(found->registration.world_from_prototype,
                           turned_from_world * world.world_from_prototype, 0.05_deg, 0.3_mm));
   }
+}
+
+// The scan shows the door's front and the room behind it.
+TEST(Align, SaysHowMuchOfScanAndMeshLieOnEachOther) {
+  auto rng = test_rng();
+  const sim::World world = bench_world();
+  const scene::Mesh& door = world.scene->prototype->mesh;
+  const scene::MeshBvh index(door);
+  const auto met = landings(world);
+  const Overlap whole =
+      overlap(door, index, scan_captures(world, met, 0, 1, rng), world.world_from_prototype);
+  EXPECT_GT(whole.mesh_share, 0.25);
+  EXPECT_LT(whole.mesh_share, 0.6) << "the back of the door is not seen";
+  EXPECT_TRUE(check_overlap(whole));
+  // A part of the door alone: little of the mesh, but all of the scan.
+  scene::ScanSurface detail = scan_captures(world, met, 0.45, 0.55, rng);
+  const Pose prototype_from_world = world.world_from_prototype.inverse();
+  std::vector<bool> is_door;
+  for (const auto& p : detail.positions)
+    is_door.push_back(index.nearest(prototype_from_world * p.cast<double>(), 2_mm).has_value());
+  detail = scene::with_vertices_kept(detail, is_door);
+  const Overlap part = overlap(door, index, detail, world.world_from_prototype);
+  EXPECT_GT(part.scan_share, 0.95);
+  EXPECT_LT(part.mesh_share, 0.25);
+  EXPECT_TRUE(check_overlap(part));
+}
+
+// A vase as large as the door.
+TEST(Align, RefusesAnotherObject) {
+  auto rng = test_rng();
+  const sim::World world = bench_world();
+  const scene::ScanSurface scan = scan_captures(world, landings(world), 0, 1, rng);
+  const scene::Mesh vase = test::grid(60, 60, [](double u, double v) {
+    const double radius = 0.15 + 0.06 * std::sin(9 * v), angle = -2 * M_PI * u;
+    return Vector3d(radius * std::cos(angle), radius * std::sin(angle), 0.6 * v);
+  });
+  const scene::MeshBvh index(vase);
+  const auto found = global_registration(vase, index, scan);
+  if (!found) return;  // the search has refused it already
+  const Overlap shares = overlap(vase, index, scan, found->registration.world_from_prototype);
+  EXPECT_FALSE(check_overlap(shares)) << shares.scan_share << " " << shares.mesh_share;
+  test::expect_contains(check_overlap(shares).message(), "Is this the CAD of the scanned object?");
 }
 
 // A square plate in the plane z = 0 of the world, 0.2 m wide, a point every 4 mm, `bump` m higher in a disc

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <functional>
+
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
@@ -70,6 +73,29 @@ TEST_F(ConfigFile, TheFirstProblemIsKept) {
                         root.at("b").number();
                       }),
               "a: expected a finite number, found string \"x\"");
+}
+
+TEST_F(ConfigFile, NumbersBeyondReasonAreRefusedAtTheirKey) {
+  const auto with = [&](const std::string& value, const std::function<void(const ConfigNode&)>& read) {
+    return message(fmt::format(R"({{"schema": "limn.test/1", "a": {{"b": {}}}}})", value),
+                   [&](const ConfigNode& root) { read(root.at("a").at("b")); });
+  };
+  EXPECT_SAYS(with("-1e308", [](const ConfigNode& b) { b.number(); }),
+              "a.b: expected a number from -1000000000");
+  EXPECT_SAYS(with("99999999999999999999", [](const ConfigNode& b) { b.integer(); }),
+              "a.b: expected a whole");
+  EXPECT_SAYS(with("12", [](const ConfigNode& b) { b.positive(11); }), "a.b: expected at most 11, found 12");
+  EXPECT_SAYS(with("[0, 1e6, 0]", [](const ConfigNode& b) { b.vector3(); }), "a.b: expected three numbers");
+  EXPECT_SAYS(with(R"({"rotation_wxyz": [1, 0, 0, 0], "translation_m": [1e308, 0, 0]})",
+                   [](const ConfigNode& b) { b.pose(); }),
+              "a.b.translation_m[0]: expected a number");
+  for (const char* size : {"[99999999999999999999, 2]", "[2, 16385]", "[2.5, 2]", "[0, 2]", "[2]", "7"})
+    EXPECT_SAYS(with(size, [](const ConfigNode& b) { b.image_size(); }), "a.b");
+  EXPECT_EQ(with("[16384, 1]",
+                 [](const ConfigNode& b) {
+                   EXPECT_EQ(b.image_size(), (std::array{16384, 1}));
+                 }),
+            "");
 }
 
 TEST_F(ConfigFile, UnknownAndMissingKeysAreErrors) {

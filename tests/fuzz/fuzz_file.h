@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/imager.h"
+#include "core/result.h"
 
 namespace limn::test {
 
@@ -15,6 +16,12 @@ std::filesystem::path fuzzed_file(const std::uint8_t* bytes, std::size_t size, c
 
 /// Checks a message for people: it must name the file. Throws otherwise.
 void check_message(const std::string& message, const std::filesystem::path& file);
+
+/// Checks a reader's answer: a value, or a message that names the file. Throws otherwise.
+template <class Value>
+void check_read(const Result<Value>& read, const std::filesystem::path& file) {
+  if (!read) check_message(read.message(), file);
+}
 
 /// Checks a camera that a reader accepted: sizes and values must be usable, and rays must survive a round
 /// trip. Throws otherwise.

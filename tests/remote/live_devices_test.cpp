@@ -26,6 +26,7 @@
 #include "tests/remote/remote_client.h"
 #include "tests/support/clicker.h"
 #include "tests/support/matchers.h"
+#include "tests/support/small_disk.h"
 #include "tests/support/worlds.h"
 
 namespace limn::remote {
@@ -147,6 +148,20 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
   for (int i = 0; i < 500 && health.use_count() > 1; ++i)
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   EXPECT_EQ(health.use_count(), 1) << "its thread has ended and taken everything with it";
+}
+
+TEST(Recorder, AFullDiskLeavesNoHalfRecording) {
+  const fs::path folder = test::test_folder();
+  const sim::World world = test::studio_world();
+  session::SessionSetup setup;
+  setup.rig = world.rig;
+  setup.scene = *world.scene;
+  {
+    const test::SmallDisk disk(3000);
+    EXPECT_FALSE(session::Recorder::create(folder / "recording", setup));
+  }
+  EXPECT_TRUE(fs::is_empty(folder / "recording"));
+  EXPECT_TRUE(session::Recorder::create(folder / "recording", setup));
 }
 
 // Brightness by JPEG itself is not what its colours make of it.

@@ -4,6 +4,7 @@
 
 #include "remote/http/own_addresses.h"
 #include "tests/remote/a_server.h"
+#include "tests/support/text.h"
 
 namespace limn::remote {
 namespace {
@@ -274,15 +275,38 @@ TEST_F(AServer, AnswersEveryFrameOfAWindowWithItsNumber) {
 
 TEST_F(AServer, OpensNoMoreWindowsThanItCanLookThrough) {
   open({}, echoing_providers());
+  const std::array<const char*, 5> names = {"Ann", "Bea", "Carl", "Dora", "Emil"};
   std::vector<std::unique_ptr<RemoteClient>> tablets;
   for (std::ptrdiff_t i = 0; i <= k_max_windows; ++i) {
-    tablets.push_back(guest(Role::look));
+    tablets.push_back(guest(Role::look, names.at(static_cast<std::size_t>(i / k_max_windows_of_guest))));
     tablets.back()->send_text(
         fmt::format(R"({{"type": "window", "device": "tablet-{:04}", "on": true}})", i));
   }
   EXPECT_TRUE(tablets.back()->message_of("refused"));
   tablets.front()->send_binary(number_bytes(1) + k_jpeg);
   const auto answer = tablets.front()->message();
+  ASSERT_TRUE(answer);
+  EXPECT_FALSE(answer->is_text);
+}
+
+TEST_F(AServer, OneGuestCannotTakeAllWindows) {
+  open({}, echoing_providers());
+  std::vector<std::unique_ptr<RemoteClient>> tabs;
+  const auto open_window = [&](const std::string& token) {
+    tabs.push_back(client());
+    EXPECT_EQ(tabs.back()->upgrade(token).status, 101);
+    EXPECT_TRUE(tabs.back()->message_of("hello"));
+    tabs.back()->send_text(
+        fmt::format(R"({{"type": "window", "device": "tablet-{:04}", "on": true}})", tabs.size()));
+  };
+  const std::string ann = token_of(Role::look), bea = token_of(Role::look, "Bea");
+  for (std::ptrdiff_t i = 0; i <= k_max_windows_of_guest; ++i) open_window(ann);
+  const auto refused = tabs.back()->message_of("refused");
+  ASSERT_TRUE(refused);
+  test::expect_contains(*refused, "close one of them first");
+  open_window(bea);
+  tabs.back()->send_binary(number_bytes(1) + k_jpeg);
+  const auto answer = tabs.back()->message();
   ASSERT_TRUE(answer);
   EXPECT_FALSE(answer->is_text);
 }

@@ -222,7 +222,10 @@ nlohmann::ordered_json json_of(const MeshAligned& aligned,
     json["covariance"].push_back(row);
   }
   json["rms_mm"] = 1e3 * a.rms_m;
-  json["points"] = {{"near", a.near}, {"used", a.used}};
+  json["points"] = {{"near", a.near}, {"used", a.used}, {"scan", aligned.overlap.scan_points}};
+  json["near_mm"] = 1e3 * aligned.overlap.near_m;
+  json["scan_share_near"] = aligned.overlap.scan_share;
+  json["cad_share_near"] = aligned.overlap.mesh_share;
   json["free_directions"] = a.free_directions;
   json["differences"] = nlohmann::ordered_json::array();
   for (const calib::Difference& d : differences)
@@ -307,6 +310,7 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
     return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
   const scene::MeshBvh index(mesh);
   LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
+  aligned.overlap = calib::overlap(mesh, index, scan, aligned.registration.world_from_prototype);
   const auto residuals = calib::residuals(index, scan, aligned.registration, k_residual_reach_m);
   const auto differences =
       calib::differences(scan, residuals, aligned.registration, {.least_m = 1e-3 * command.least_mm});
@@ -326,6 +330,9 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
   LIMN_TRY_STATUS(write_pose(aligned.registration.world_from_prototype, command.out));
   if (!command.body.empty())
     LIMN_TRY_STATUS(write_markers(command, aligned.registration.world_from_prototype));
+  if (const Status same = calib::check_overlap(aligned.overlap); !same)
+    return error("{}: {} The files in {} show what was found.", file.string(), same.message(),
+                 command.out.string());
   return aligned;
 }
 

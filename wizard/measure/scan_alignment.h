@@ -30,15 +30,16 @@ struct AlignOptions {
 /// The result of an alignment.
 struct MeshAligned {
   calib::Registration registration;
+  calib::Overlap overlap;             ///< of the scan and the mesh; zeros without a scan
   std::string how;                    ///< where the start came from
   std::vector<std::string> warnings;  ///< symmetry, undetermined directions, differences of CAD and scan
 };
 
 /// Finds the pose of a CAD mesh in the scan and writes poses.json (which can be given as POSES.json),
 /// align.json with the covariance, residual.ply, residual.png and residual-side.png; warns where the CAD and
-/// the scan differ. With a body it also writes markers.json (limn.markers/1), for a scene's
-/// prototype.markers. Without a start the whole scan is searched. The alignment is computed before the first
-/// file is written.
+/// the scan differ, and fails, with all files written, where they are hardly the same object. With a body it
+/// also writes markers.json (limn.markers/1), for a scene's prototype.markers. Without a start the whole scan
+/// is searched. The alignment is computed before the first file is written.
 Result<MeshAligned> align_scan(const AlignOptions& command);
 
 }  // namespace limn::wizard

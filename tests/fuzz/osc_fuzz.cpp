@@ -1,0 +1,16 @@
+// Datagrams of Open Sound Control.
+#include "core/utf8.h"
+#include "session/osc.h"
+#include "tests/fuzz/fuzz_file.h"
+
+int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  using namespace limn;
+  const auto edit = session::edit_of_osc({bytes, size});
+  if (!edit) {
+    LIMN_CHECK(edit.message().find("expected") != std::string::npos);
+    LIMN_CHECK(is_utf8(edit.message()));
+    return 0;
+  }
+  LIMN_CHECK(is_utf8(edit->action) && is_utf8(edit->slot) && is_utf8(edit->value));
+  return 0;
+}
