@@ -167,7 +167,8 @@ void add_detect(CLI::App& app, Run& run) {
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--camera", options->camera,
-                      "Camera file: .cameramodel, OpenCV YAML or ARToolKit camera_para.dat");
+                      "Camera file of mrcal, OpenCV, ROS, Kalibr, PhotonVision, ORB-SLAM or ARToolKit; "
+                      "FILE:NAME for one of several");
   command->add_option("--size-mm", options->size_mm,
                       "Side of the black square in mm; with --camera it gives poses");
   add_choice(command, "--pose", &options->pose, k_pose_methods,
@@ -560,7 +561,7 @@ void add_check(CLI::App& app, Run& run) {
 
 void add_export(CLI::App& app, Run& run) {
   auto* command =
-      app.add_subcommand("export", "Export warp and blend maps of every projector for other programs");
+      app.add_subcommand("export", "Export maps of every projector, or the rig's lenses, for other programs");
   command->footer(
       "Writes MPCDI 2.0 (VESA). The maps have the projectors' size. Points are in metres in the frame of "
       "the\n"
@@ -570,9 +571,12 @@ void add_export(CLI::App& app, Run& run) {
       "y down,\n"
       "0 to 1) in the image of one viewer. Alpha map: the projector's share of the linear light, value =\n"
       "share^(1/gamma). Beta map (where black light was measured): display values that make black even.\n"
+      "--opencv, --ros and --kalibr write the rig's cameras and projectors as camera files; they need --rig "
+      "alone.\n"
       "Example: limn export --mpcdi door.mpcdi --rig rig --scene config/scenes/door --poses poses.json\n"
       "Example: limn export --warp warps --format exr --rig rig --scene config/scenes/door --poses "
-      "poses.json");
+      "poses.json\n"
+      "Example: limn export --opencv cameras --kalibr camchain.yaml --rig rig");
   auto options = std::make_shared<exchange::ExportOptions>();
   command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write");
   add_choice(command, "--profile", &options->profile, exchange::k_written_mpcdi_profiles,
@@ -587,10 +591,16 @@ void add_export(CLI::App& app, Run& run) {
              "File format of --warp: pfm or exr (R, G, B are x, y, z)");
   command->add_option("--looks", options->looks,
                       "Folder for look-SLOT-VARIANT.png, each variant as the viewer sees it");
+  command->add_option("--opencv", options->opencv, "Folder for NAME.yml, OpenCV's camera files");
+  command->add_option("--ros", options->ros, "Folder for NAME.yaml, ROS's camera_info files");
+  command->add_option(
+      "--kalibr", options->kalibr,
+      "Kalibr's camchain to write: cameras, then projectors, each relative to the one before");
   command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")
       ->required();
-  command->add_option("--scene", options->scene, "Scene folder or its scene.json")->required();
-  command->add_option("--poses", options->poses, "POSES.json with the pose of the prototype")->required();
+  command->add_option("--scene", options->scene,
+                      "Scene folder or its scene.json, for --mpcdi, --warp and --looks");
+  command->add_option("--poses", options->poses, "POSES.json with the pose of the prototype, likewise");
   command->add_option("--viewer", options->viewer,
                       "Viewer file for --profile 3d and --looks; without it the scene's viewer");
   auto json = std::make_shared<bool>(false);

@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "core/camera_files/imager_file.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"

@@ -46,26 +46,32 @@ void print(const ordered_json& report) {
   }
 }
 
-}  // namespace
-
-Status run_export(const exchange::ExportOptions& options, bool is_json) {
-  LIMN_TRY_STATUS(exchange::check_export(options));
-  LIMN_TRY(exchange::ExportJob job, exchange::load_export_job(options));
+// The maps of all projectors, drawn without a display.
+Status add_maps(const exchange::ExportOptions& options, exchange::ExportJob* job) {
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   log_info("export: {}", context.description());
-  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(job.scene, job.rig));
-  const scene::PosedScene bare{job.posed.world_from_prototype, {}};
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(job->scene, job->rig));
+  const scene::PosedScene bare{job->posed.world_from_prototype, {}};
   int lit = 0;
-  for (std::size_t i = 0; i < job.rig.projectors.size(); ++i) {
-    job.maps.push_back(exchange::projector_maps(&renderer, i, bare));
-    lit += job.maps.back().lit;
-    if (job.maps.back().lit == 0)
-      log_warning("export: {} does not reach the prototype; its maps are empty", job.rig.projectors[i].name);
+  for (std::size_t i = 0; i < job->rig.projectors.size(); ++i) {
+    job->maps.push_back(exchange::projector_maps(&renderer, i, bare));
+    lit += job->maps.back().lit;
+    if (job->maps.back().lit == 0)
+      log_warning("export: {} does not reach the prototype; its maps are empty", job->rig.projectors[i].name);
   }
   if (lit == 0) {
     return error("{}: expected a prototype that a projector reaches, found none. Check rig and poses.",
                  options.poses.string());
   }
+  return {};
+}
+
+}  // namespace
+
+Status run_export(const exchange::ExportOptions& options, bool is_json) {
+  LIMN_TRY_STATUS(exchange::check_export(options));
+  LIMN_TRY(exchange::ExportJob job, exchange::load_export_job(options));
+  if (exchange::needs_prototype(options)) LIMN_TRY_STATUS(add_maps(options, &job));
   for (const exchange::Exporter& exporter : exchange::exporters())
     if (exporter.is_asked_for(options)) LIMN_TRY_STATUS(exporter.write(job, options));
   const ordered_json report = report_of(job);

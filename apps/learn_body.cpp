@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "core/camera_files/imager_file.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
-#include "core/imager_file.h"
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/print.h"

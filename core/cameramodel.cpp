@@ -168,6 +168,14 @@ struct ModelFields {
   std::vector<double> intrinsics, extrinsics, imagersize;
 };
 
+// mrcal before version 1 had the keys distortion_model and lens_model, and models such as DISTORTION_OPENCV4.
+std::string todays_name(std::string_view model) {
+  constexpr std::string_view k_old = "DISTORTION_";
+  if (!model.starts_with(k_old)) return std::string(model);
+  model.remove_prefix(k_old.size());
+  return "LENSMODEL_" + std::string(model == "NONE" ? "PINHOLE" : model);
+}
+
 // Nullopt when the text is not a dictionary; `text` then stands where reading failed.
 std::optional<ModelFields> fields_of(ModelText& text) {
   ModelFields fields;
@@ -175,10 +183,10 @@ std::optional<ModelFields> fields_of(ModelText& text) {
   while (!text.accept('}')) {
     const auto key = text.quoted();
     if (!key || !text.accept(':')) return std::nullopt;
-    if (*key == "lensmodel") {
+    if (*key == "lensmodel" || *key == "lens_model" || *key == "distortion_model") {
       const auto name = text.quoted();
       if (!name) return std::nullopt;
-      fields.lensmodel = *name;
+      fields.lensmodel = todays_name(*name);
     } else if (*key == "intrinsics" || *key == "extrinsics" || *key == "imagersize") {
       const auto numbers = text.numbers();
       if (!numbers) return std::nullopt;
@@ -194,6 +202,11 @@ std::optional<ModelFields> fields_of(ModelText& text) {
 }
 
 Result<Imager> imager_of(const ModelFields& fields, const fs::path& path) {
+  if (fields.lensmodel.starts_with("LENSMODEL_CAHVORE"))
+    return error(
+        "{}: lensmodel: expected a model with one centre of projection, found {}. Convert the file with "
+        "mrcal-convert-lensmodel to LENSMODEL_SPLINED_STEREOGRAPHIC or LENSMODEL_OPENCV8.",
+        path.string(), fields.lensmodel);
   auto lens = Lens::create(fields.lensmodel, fields.intrinsics);
   if (!lens) return error("{}: {}", path.string(), lens.message());
   const std::vector<double>& rt = fields.extrinsics;

@@ -89,7 +89,21 @@ bool is_unfolded(const LensModel& model, std::span<const double> values, const E
   return keeps_orientation(model, values, xy);
 }
 
-// Newton's method on the normalised coordinates; steps are halved while the residual grows.
+// Two coordinates for a direction: (x, y, 1) for models with a projection plane, else stereographic ones,
+// which also reach behind the imager.
+Eigen::Vector3d point_at(const LensModel& model, const Eigen::Vector2d& xy) {
+  return {xy.x(), xy.y(), model.projects_behind() ? 1 - xy.squaredNorm() / 4 : 1};
+}
+
+// Derivative of the pixel with respect to these coordinates.
+Eigen::Matrix2d by_coordinates(const LensModel& model,
+                               const PixelByPoint& d_px_d_p,
+                               const Eigen::Vector2d& xy) {
+  if (!model.projects_behind()) return d_px_d_p.leftCols<2>();
+  return d_px_d_p.leftCols<2>() - d_px_d_p.col(2) * xy.transpose() / 2;
+}
+
+// Newton's method on these coordinates; steps are halved while the residual grows.
 bool newton_unproject(const LensModel& model,
                       std::span<const double> values,
                       const Eigen::Vector2d& px,
@@ -97,21 +111,21 @@ bool newton_unproject(const LensModel& model,
                       Eigen::Vector3d* d_imager) {
   Eigen::Vector2d found;
   PixelByPoint jacobian;
-  if (!model.project(values, xy.homogeneous(), &found, jacobian.data())) return false;
+  if (!model.project(values, point_at(model, xy), &found, jacobian.data())) return false;
   double residual = (found - px).norm();
   for (int step = 0; step < k_max_newton_steps && residual > k_unproject_tolerance_px; ++step) {
-    const Eigen::Vector2d delta = jacobian.leftCols<2>().inverse() * (px - found);
+    const Eigen::Vector2d delta = by_coordinates(model, jacobian, xy).inverse() * (px - found);
     double scale = 1;
     Eigen::Vector2d tried;
     for (;; scale /= 2) {
       if (scale < 1e-3 || !delta.allFinite()) return false;
       tried = xy + scale * delta;
-      if (model.project(values, tried.homogeneous(), &found, jacobian.data()) &&
+      if (model.project(values, point_at(model, tried), &found, jacobian.data()) &&
           (found - px).norm() < residual) {
         break;
       }
       if (residual < k_accepted_residual_px) {  // limit of rounding: no step improves it further
-        *d_imager = xy.homogeneous().normalized();
+        *d_imager = point_at(model, xy).normalized();
         return true;
       }
     }
@@ -119,7 +133,7 @@ bool newton_unproject(const LensModel& model,
     residual = (found - px).norm();
   }
   if (!(residual < k_accepted_residual_px)) return false;
-  *d_imager = xy.homogeneous().normalized();
+  *d_imager = point_at(model, xy).normalized();
   return true;
 }
 
@@ -178,11 +192,13 @@ bool LensModel::unproject(std::span<const double> values,
                           const Eigen::Vector2d& px,
                           Eigen::Vector3d* d_imager) const {
   if (!px.allFinite()) return false;
+  const Eigen::Vector2d start((px.x() - values[2]) / values[0], (px.y() - values[3]) / values[1]);
   if (!impl_->projects_behind) {
-    const Eigen::Vector2d start((px.x() - values[2]) / values[0], (px.y() - values[3]) / values[1]);
     return newton_unproject(*this, values, px, start, d_imager) &&
            is_unfolded(*this, values, d_imager->hnormalized());
   }
+  if (newton_unproject(*this, values, px, start, d_imager)) return true;
+  // mrcal's own search is many times slower, but finds directions far from the start.
   const mrcal_point2_t pixel{.xy = {px.x(), px.y()}};
   mrcal_point3_t direction{};
   if (!mrcal_unproject(&direction, &pixel, 1, &impl_->model, values.data())) return false;
@@ -206,7 +222,8 @@ Result<Lens> Lens::create(const std::string& model_name, std::vector<double> val
   }
   for (std::size_t i = 0; i < 4; ++i) {
     if (std::abs(values[i]) > k_largest_lens_px)
-      return error("lens values[{}]: expected at most {} pixels, found {}.", i, k_largest_lens_px, values[i]);
+      return error("lens values[{}]: expected a number of pixels up to {:g}, found {:g}.", i,
+                   k_largest_lens_px, values[i]);
   }
   return Lens{std::move(model), std::move(values)};
 }

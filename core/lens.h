@@ -57,9 +57,9 @@ class LensModel {
   explicit LensModel(std::shared_ptr<const Impl> impl) : impl_(std::move(impl)) {}
 };
 
-/// Largest focal length and largest coordinate of a principal point, in pixels. A lens of 0.1 degrees on the
-/// largest imager has a tenth of it.
-inline constexpr double k_largest_lens_px = 1e8;
+/// Largest focal length and largest coordinate of a principal point, in pixels. Larger ones are mistakes: an
+/// image of 16384 pixels would be 0.1 degrees wide.
+inline constexpr double k_largest_lens_px = 1e7;
 
 /// A lens: model and values. Pixel (0,0) is the centre of the top-left pixel.
 struct Lens {

@@ -9,9 +9,9 @@
 
 namespace limn {
 
-/// The scalars and matrices at the top level of a file that cv::FileStorage wrote, by name; lists and maps
-/// are left out. Limn has its own reader because OpenCV 4.6 crashes on some damaged files (XML with tags that
-/// do not match, matrices with a size that is not a number).
+/// The scalars and matrices at the top level of a file that cv::FileStorage wrote, by name; other entries
+/// have no numbers and no text. It is read by parse_data, because OpenCV 4.6 crashes on some damaged files
+/// (XML with tags that do not match, matrices with a size that is not a number).
 class OpencvFile {
  public:
   struct Value {

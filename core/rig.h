@@ -6,7 +6,6 @@
 
 #include "core/cameramodel.h"
 #include "core/imager.h"
-#include "core/imager_file.h"
 #include "core/photometric_response.h"
 #include "core/result.h"
 

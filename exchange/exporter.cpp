@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "exchange/camera_exporter.h"
 #include "exchange/look_exporter.h"
 #include "exchange/mpcdi_exporter.h"
 #include "exchange/warp_exporter.h"
@@ -12,7 +13,9 @@
 namespace limn::exchange {
 
 const std::vector<Exporter>& exporters() {
-  static const std::vector<Exporter> all = {mpcdi_exporter(), warp_exporter(), look_exporter()};
+  static const std::vector<Exporter> all = {mpcdi_exporter(),      warp_exporter(),
+                                            look_exporter(),       opencv_camera_exporter(),
+                                            ros_camera_exporter(), kalibr_exporter()};
   return all;
 }
 
@@ -26,13 +29,25 @@ Status check_export(const ExportOptions& options) {
     names += fmt::format("{}--{} {}", separator, exporter.name, exporter.argument);
   }
   if (!is_any_asked_for) return usage_error("expected {}, found none of them.", names);
-  for (const Exporter& exporter : exporters()) LIMN_TRY_STATUS(exporter.check(options));
+  for (const Exporter& exporter : exporters()) {
+    LIMN_TRY_STATUS(exporter.check(options));
+    if (!exporter.is_asked_for(options) || !exporter.needs_prototype) continue;
+    if (options.scene.empty() || options.poses.empty())
+      return usage_error("--{}: expected --scene and --poses beside it, found none.", exporter.name);
+  }
   return {};
+}
+
+bool needs_prototype(const ExportOptions& options) {
+  return std::ranges::any_of(exporters(), [&](const Exporter& exporter) {
+    return exporter.is_asked_for(options) && exporter.needs_prototype;
+  });
 }
 
 Result<ExportJob> load_export_job(const ExportOptions& options) {
   ExportJob job;
   LIMN_TRY(job.rig, load_rig(options.rig));
+  if (!needs_prototype(options)) return job;
   LIMN_TRY(job.scene, scene::load_scene(options.scene));
   LIMN_TRY(job.posed, scene::load_poses(options.poses, job.scene));
   if (job.rig.projectors.empty())

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "core/camera_files/imager_file.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"

@@ -23,8 +23,8 @@
 #include <string>
 #include <vector>
 
+#include "core/camera_files/imager_file.h"
 #include "core/image_io.h"
-#include "core/imager_file.h"
 #include "core/median.h"
 #include "tests/bench/tracker_frames.h"
 #include "tests/bench/tracker_peers.h"

@@ -1,4 +1,4 @@
-#include "core/imager_file.h"
+#include "core/camera_files/imager_file.h"
 
 #include <gtest/gtest.h>
 

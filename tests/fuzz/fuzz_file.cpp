@@ -2,8 +2,9 @@
 
 #include <unistd.h>
 
+#include "core/camera_files/imager_file.h"
 #include "core/file.h"
-#include "core/imager_file.h"
+#include "core/log.h"
 
 namespace limn::test {
 namespace {
@@ -60,6 +61,7 @@ void check_imager(const Imager& imager) {
 }
 
 void check_camera(const std::uint8_t* bytes, std::size_t size, const std::string& name) {
+  set_log_level(LogLevel::warning);
   const fs::path file = fuzzed_file(bytes, size, name);
   const auto imager = load_imager(file);
   if (imager)

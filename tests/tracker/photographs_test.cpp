@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/camera_files/imager_file.h"
 #include "core/image_io.h"
 #include "core/rig.h"
 #include "tests/support/matchers.h"
