@@ -112,15 +112,18 @@ void add_markers(CLI::App& app, Run& run) {
   auto options = std::make_shared<MarkersOptions>();
   auto learning = std::make_shared<LearnBodyOptions>();
   command
-      ->add_option("--family", options->family,
-                   "Marker family, such as apriltag_36h11, artoolkit_3x3 or artoolkit:hiro.patt")
+      ->add_option(
+          "--family", options->family,
+          "Marker family, such as apriltag_36h11, apriltag_41h12, artoolkit_3x3 or artoolkit:hiro.patt; "
+          "white on black with _inverted: aruco_4x4_50_inverted")
       ->capture_default_str();
   command->add_option("--ids", options->ids, "Numbers of the markers, such as 0-11,15")
       ->capture_default_str();
-  command->add_option("--size-mm", options->size_mm, "Side of the black square in mm")->capture_default_str();
-  command->add_option(
-      "--board", options->board,
-      "Make a calibration board instead of markers, such as charuco:11x8:25mm or chessboard:9x7:75mm");
+  command->add_option("--size-mm", options->size_mm, "Side of the marker's square in mm")
+      ->capture_default_str();
+  command->add_option("--board", options->board,
+                      "Make a calibration board instead of markers, such as charuco:11x8:25mm, "
+                      "chessboard:9x7:75mm or aprilgrid:6x6:88mm:0.3");
   auto* learn = command->add_option(
       "--learn-body", learning->images,
       "Instead of a sheet: measure from these photographs where the markers of a rigid body are on it");
@@ -131,6 +134,11 @@ void add_markers(CLI::App& app, Run& run) {
   auto* train =
       command->add_option("--train", options->train,
                           "Instead of a sheet: make a template from the one black frame in this image");
+  command
+      ->add_option("--pattern-ratio", options->pattern_ratio,
+                   "With --train: width of the frame's inside as share of the frame's (AR.js: patternRatio)")
+      ->needs(train)
+      ->capture_default_str();
   auto* compare =
       command->add_option("--compare", options->compare,
                           "Instead of a sheet: measure how well these templates can be distinguished");
@@ -163,7 +171,12 @@ void add_detect(CLI::App& app, Run& run) {
       "--draw out");
   auto options = std::make_shared<DetectOptions>();
   command->add_option("images", options->images, "PNG or JPEG images")->required();
-  command->add_option("--family", options->families, "Marker families to look for, separated by commas")
+  command
+      ->add_option(
+          "--family", options->families,
+          "Marker families to look for, separated by commas; white markers on black with _inverted, such as "
+          "aruco_4x4_50_inverted; templates with another pattern ratio than 0.5 as "
+          "artoolkit:logo.patt@0.8")
       ->delimiter(',')
       ->capture_default_str();
   command->add_option("--camera", options->camera,

@@ -288,6 +288,26 @@ void detect_all(const DetectOptions& options,
   run_on_threads(threads, work);
 }
 
+// The pattern ratio of a template is not in its file, and with a wrong one nothing is found.
+void hint_at_pattern_ratio(const std::vector<std::string>& families,
+                           const std::vector<DetectOutcome>& outcomes) {
+  const bool without_ratio = std::ranges::any_of(families, [](const std::string& name) {
+    return (name.starts_with("artoolkit:") || name.starts_with("artoolkit_inverted:")) &&
+           name.find('@') == std::string::npos;
+  });
+  const bool is_found = std::ranges::any_of(outcomes, [](const DetectOutcome& outcome) {
+    return std::ranges::any_of(outcome.markers, [](const Marker& marker) {
+      const std::string& family = marker.detection.marker.family;
+      return family == "artoolkit" || family == "artoolkit_inverted";
+    });
+  });
+  if (without_ratio && !is_found)
+    log_info(
+        "no template was found. Patterns are assumed to be half as wide as the black square; state another "
+        "share "
+        "(AR.js: patternRatio) after the file's name: artoolkit:logo.patt@0.8");
+}
+
 Status check_options(const DetectOptions& options) {
   if (options.images.empty()) return usage_error("limn detect: expected images, found none.");
   if (!std::isfinite(options.size_mm) || options.size_mm < 0)
@@ -322,6 +342,7 @@ Status run_detect(const DetectOptions& options) {
       log_warning("{}", outcome.problem);
     }
   }
+  hint_at_pattern_ratio(options.families, outcomes);
   const bool with_family = std::set(options.families.begin(), options.families.end()).size() > 1;
   if (!options.csv.empty()) LIMN_TRY_STATUS(write_file(options.csv, csv_text(outcomes, with_family)));
   if (!options.json.empty()) LIMN_TRY_STATUS(write_file(options.json, outcomes_json(outcomes)));

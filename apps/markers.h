@@ -11,9 +11,10 @@ namespace limn::apps {
 struct MarkersOptions {
   std::string family = "aruco_4x4_50";
   std::string ids = "0-11";     ///< Such as 0-11,15; unused by a template file, which is one marker.
-  double size_mm = 40;          ///< Side of the black square.
-  std::string board;            ///< Instead of markers: charuco:11x8:25mm, chessboard:9x7:75mm.
+  double size_mm = 40;          ///< Side of the marker's square.
+  std::string board;            ///< Instead of markers: charuco:11x8:25mm, aprilgrid:6x6:88mm:0.3 …
   std::filesystem::path train;  ///< Instead: an image whose black frame becomes the template `out`.
+  double pattern_ratio = 0.5;   ///< For `train`: width of the frame's inside as share of the frame's.
   std::vector<std::filesystem::path> compare;  ///< Instead: template files to compare.
   std::filesystem::path json;                  ///< Report of the comparison; empty: none.
   std::filesystem::path mount;  ///< Also a holder for a marker, .stl (exchange/printing/marker_mount.h).

@@ -79,7 +79,8 @@ class Grid {
     std::vector<cv::Point2d> squares, px;
     for (const auto& [distance, corner] : near) {
       const auto [c, r] = grid_of(*corner);
-      squares.emplace_back(c - column, r - row);
+      squares.emplace_back((board_.p_line(c) - board_.p_line(column)) / board_.square_m,
+                           (board_.p_line(r) - board_.p_line(row)) / board_.square_m);
       px.emplace_back(corner->px.x(), corner->px.y());
     }
     const cv::Mat h = cv::findHomography(squares, px, 0);

@@ -90,8 +90,11 @@ void observe_place(const DescribedRig& described,
   for (std::size_t p = 0; p < described.rig.projectors.size(); ++p) {
     const Imager& projector = described.rig.projectors[p];
     for (int cell = 0; cell < 4 * board.columns * board.rows; ++cell) {  // cells of half a square
-      const Vector3d p_board((cell % (2 * board.columns) + 0.5) * board.square_m / 2,
-                             (cell / (2 * board.columns) + 0.5) * board.square_m / 2, 0);
+      const auto middle = [&](int half) {                                // of a half square
+        const double from = board.p_line(half / 2), to = board.p_line(half / 2 + 1);
+        return from + (half % 2 == 0 ? 0.25 : 0.75) * (to - from);
+      };
+      const Vector3d p_board(middle(cell % (2 * board.columns)), middle(cell / (2 * board.columns)), 0);
       const auto px = image_of(p_board);
       if (!px || !faces(projector, world_from_board, world_from_board * p_board)) continue;
       Vector2d px_projector;

@@ -277,8 +277,9 @@ struct Plate {
   double side_m;
 };
 
-Plate plate_of(const cv::Mat& marker, double size_m, const MarkerPaper& paper) {
+Plate plate_of(const MarkerDrawing& drawing, double size_m, const MarkerPaper& paper) {
   constexpr int k_fine_px = 400;  // least resolution; the margin is rounded to whole pixels of it
+  const cv::Mat& marker = drawing.image;
   const int scale = std::max(1, (k_fine_px + marker.cols - 1) / marker.cols);
   cv::Mat fine, sheet;
   fine.create(marker.rows * scale, marker.cols * scale, CV_8U);
@@ -287,7 +288,7 @@ Plate plate_of(const cv::Mat& marker, double size_m, const MarkerPaper& paper) {
       fine.at<std::uint8_t>(r, c) = marker.at<std::uint8_t>(r / scale, c / scale);
   const int margin = static_cast<int>(std::lround(paper.margin * fine.cols));
   cv::copyMakeBorder(fine, sheet, margin, margin, margin, margin, cv::BORDER_CONSTANT, cv::Scalar(255));
-  return {sheet, size_m * sheet.cols / fine.cols};
+  return {sheet, size_m / drawing.square_share() * sheet.cols / fine.cols};
 }
 
 Status add_plate(World& world,
@@ -295,9 +296,10 @@ Status add_plate(World& world,
                  bool on_prototype,
                  const MarkerImage& draw,
                  const MarkerPaper& paper) {
-  LIMN_TRY(const cv::Mat image, draw(marker.marker));
+  LIMN_TRY(const MarkerDrawing drawing, draw(marker.marker));
+  const cv::Mat& image = drawing.image;
   LIMN_CHECK(image.type() == CV_8UC1 && image.rows == image.cols && image.rows > 0);
-  const Plate plate = plate_of(image, marker.size_m, paper);
+  const Plate plate = plate_of(drawing, marker.size_m, paper);
   const Pose place =
       on_prototype ? world.world_from_prototype * marker.body_from_marker : marker.body_from_marker;
   Object object = sheet("marker-" + marker.marker.text(), plate.side_m, plate.side_m, plate.image, place);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "core/marker.h"
+#include "core/marker_drawing.h"
 #include "core/result.h"
 #include "core/rig.h"
 #include "scene/mesh.h"
@@ -101,9 +102,8 @@ struct World {
   Object* find(const std::string& object);
 };
 
-/// Makes a grey 8-bit image of a marker's black square without a margin: the image's edge is the marker's
-/// edge.
-using MarkerImage = std::function<Result<cv::Mat>(const MarkerName&)>;
+/// Makes the image of a marker without its white margin.
+using MarkerImage = std::function<Result<MarkerDrawing>(const MarkerName&)>;
 
 /// Reads a limn.world/1 file and the scene that it names; `marker_image` draws its markers. The prototype
 /// becomes the object "prototype", its markers "marker-FAMILY:ID", the table "table".

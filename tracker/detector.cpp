@@ -174,10 +174,21 @@ class Detector::UnreadQuads {
 };
 
 Detector::Detector(Families families, DetectorOptions options)
-    : families_(std::move(families)), options_(options) {
+    : Detector(families, options, Polarity::dark_on_light) {
+  if (!families.with_polarity(true).is_empty())
+    of_inverted_.reset(new Detector(families, options, Polarity::light_on_dark));
+  all_families_ = std::move(families);
+}
+
+Detector::Detector(const Families& families, const DetectorOptions& options, Polarity polarity)
+    : families_(families.with_polarity(polarity == Polarity::light_on_dark)),
+      thinnest_border_(families_.thinnest_border()),
+      options_(options),
+      is_inverted_(polarity == Polarity::light_on_dark) {
   options_.threads = std::max(1, options_.threads);
   options_.broken_markers &= std::any_of(families_.codes().begin(), families_.codes().end(), can_be_covered);
-  workers_.assign(static_cast<std::size_t>(options_.threads), {EdgeRefiner(options_.encoding), {}});
+  workers_.assign(static_cast<std::size_t>(options_.threads),
+                  {EdgeRefiner(options_.encoding, is_inverted_), {}});
 }
 
 std::vector<Detection> Detector::detect(const cv::Mat& grey, const Lens* lens) {
@@ -197,9 +208,14 @@ void Detector::detect_more(const cv::Mat& grey,
                            Reading reading) {
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
-  const bool broken = options_.broken_markers && reading == Reading::covered;
-  WorkerTeam team(options_.threads);
-  team.work([&] { find_markers(grey, lens, broken, detections, team); });
+  if (!families_.is_empty()) {
+    const bool broken = options_.broken_markers && reading == Reading::covered;
+    WorkerTeam team(options_.threads);
+    team.work([&] { find_markers(grey, lens, broken, detections, team); });
+  }
+  if (!of_inverted_) return;
+  cv::bitwise_not(grey, inverted_);
+  of_inverted_->detect_more(inverted_, lens, detections, reading);
 }
 
 void Detector::find_markers(const cv::Mat& grey,
@@ -268,6 +284,19 @@ void Detector::follow(const cv::Mat& grey,
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   detections->clear();
   if (grey.empty()) return;
+  if (!of_inverted_) return follow_own(grey, lens, last, detections);
+  std::vector<Detection> dark, light;
+  for (const Detection& marker : last)
+    (of_inverted_->families_.contains(marker.marker.family) ? light : dark).push_back(marker);
+  follow_own(grey, lens, dark, detections);
+  cv::bitwise_not(grey, inverted_);
+  of_inverted_->follow_own(inverted_, lens, light, detections);
+}
+
+void Detector::follow_own(const cv::Mat& grey,
+                          const Lens* lens,
+                          std::span<const Detection> last,
+                          std::vector<Detection>* detections) {
   for (const Detection& marker : last)
     if (auto found = found_again(grey, lens, marker)) {
       found->number = read_.size();
@@ -366,7 +395,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
                                              Reading reading,
                                              Worker& worker,
                                              const Detection* last) const {
-  if (!may_be_marker(grey, quad, options_.min_contrast)) return std::nullopt;
+  if (!may_be_marker(grey, quad, options_.min_contrast, thinnest_border_)) return std::nullopt;
   const bool covered = reading == Reading::covered;
   if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
@@ -398,7 +427,8 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
     UnshadowedSides sides = unshadowed_sides(*identity, *refined);
     sides.kept_for = is_light_known ? kept_longer(detection.unshadowed->kept_for) : k_keep_images;
     detection.unshadowed.reset();
-    shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
+    if (!is_inverted_)  // there shadows are no factors of the light
+      shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
     if (shadows == ShadowEdges::none) detection.unshadowed = sides;
   }
   if (shadows != ShadowEdges::left) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
@@ -43,8 +44,9 @@ struct DetectorOptions {
 };
 
 /// Finds markers: grey -> local threshold -> boundaries of black regions -> quadrilaterals -> sub-pixel edge
-/// lines -> rectified cells -> ids. In the rest of the image: straight edges -> quadrilaterals -> the same.
-/// Holds its buffers, so use one for each thread.
+/// lines -> rectified cells -> ids. Light squares on dark are found likewise in the inverted image, if a
+/// family has such markers. In the rest of the image: straight edges -> quadrilaterals -> the same. Holds its
+/// buffers, so use one for each thread.
 class Detector {
  public:
   explicit Detector(Families families, DetectorOptions options = {});
@@ -67,20 +69,29 @@ class Detector {
 
   /// Finds the markers of `last` again and searches only around their last places: a marker that moved by
   /// more than half of its side is lost, and new ones need detect_more(). Each square is found once, in the
-  /// order of `last`; `detections` must not be the memory of `last`. A marker that was found by its whole
-  /// pattern is found by fitting the pattern again, starting from its last appearance. The full reading is
-  /// repeated from time to time, and when the appearance changes. Shadows are searched for from time to time,
-  /// and when the light at a side changes.
+  /// order of `last` (light squares after dark ones); `detections` must not be the memory of `last`. A marker
+  /// that was found by its whole pattern is found by fitting the pattern again, starting from its last
+  /// appearance. The full reading is repeated from time to time, and when the appearance changes. Shadows are
+  /// searched for from time to time, and when the light at a side changes.
   void follow(const cv::Mat& grey,
               const Lens* lens,
               std::span<const Detection> last,
               std::vector<Detection>* detections);
 
-  const Families& families() const { return families_; }
+  const Families& families() const { return all_families_; }
 
  private:
-  Families families_;
+  enum class Polarity { dark_on_light, light_on_dark };
+  Detector(const Families& families, const DetectorOptions& options, Polarity polarity);
+
+  Families all_families_;
+  Families families_;  // those whose squares are dark in the image
+  double thinnest_border_;
   DetectorOptions options_;
+  bool is_inverted_;
+  // The families whose squares are light are found in the inverted image; null when there are none.
+  std::unique_ptr<Detector> of_inverted_;
+  cv::Mat inverted_;
   Threshold threshold_;
   CornerCodes corner_codes_;
   QuadFinder finder_;
@@ -106,6 +117,10 @@ class Detector {
   class UnreadQuads;
   std::optional<Read> follow_by_pattern(const cv::Mat& grey, const Lens* lens, const Detection& last);
   std::optional<Read> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
+  void follow_own(const cv::Mat& grey,
+                  const Lens* lens,
+                  std::span<const Detection> last,
+                  std::vector<Detection>* detections);
   void find_markers(const cv::Mat& grey,
                     const Lens* lens,
                     bool broken,

@@ -1,20 +1,27 @@
 #include "tracker/family.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
-#include <cstdlib>
+#include <map>
+#include <numeric>
 #include <opencv2/aruco/dictionary.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <utility>
 
 #include "core/file.h"
+#include "core/log.h"
 #include "core/names.h"
 #include "core/opencv_file.h"
 #include "core/predefined_family.h"
+#include "tracker/apriltag_codes.h"
+#include "tracker/aruco_mip.h"
 #include "tracker/barcode.h"
 #include "tracker/simd.h"
 
@@ -26,51 +33,65 @@ namespace {
 constexpr double k_max_random_hit = 2e-4;
 constexpr int k_max_cells = 7;  // 49 bits: OpenCV's largest code
 constexpr int k_max_codes = 100000;
+constexpr std::size_t k_max_compared = 20000;  // comparing all pairs of more codes takes seconds
 // The largest ARToolKit pattern resolution that is accepted (ARToolKit's own AR_PATT_SIZE1_MAX).
 constexpr int k_max_template_size = 64;
 constexpr const char* k_aruco_file = "aruco:";
-constexpr const char* k_artoolkit = "artoolkit:";
+constexpr const char* k_artoolkit = "artoolkit";
+constexpr std::string_view k_inverted = "_inverted";
+constexpr std::string_view k_mip = "aruco_mip_36h12";
+constexpr int k_min_wide_cells =
+    5;  // cells along a side of codes that are also read in a border of two cells
 
 std::string known_families() {
-  return joined_names(predefined_families()) + ", " + joined_names(barcodes()) +
-         ", aruco:FILE.yml, artoolkit:FILE.patt";
+  return joined_names(predefined_families()) + ", " + std::string(k_mip) + ", " +
+         joined_names(apriltag3_families()) + ", " + joined_names(barcodes()) +
+         ", aruco:FILE.yml, artoolkit:FILE.patt (FILE.patt@0.8 where the pattern is 0.8 of the square wide). "
+         "White on black: with _inverted, such as aruco_4x4_50_inverted or artoolkit_inverted:FILE.patt";
 }
 
-bool bit_of(std::uint64_t code, int cells, int row, int column) {
-  return (code >> (cells * cells - 1 - (row * cells + column))) & 1;
+// A family's name without the word for inverted colours.
+struct FamilyWord {
+  std::string name;
+  bool inverted = false;
+};
+
+FamilyWord without_inverted(const std::string& name) {
+  const std::size_t end = std::min(name.find(':'), name.size());
+  if (!name.substr(0, end).ends_with(k_inverted)) return {name, false};
+  return {name.substr(0, end - k_inverted.size()) + name.substr(end), true};
 }
 
-// The code turned clockwise by 90 degrees: the top left cell comes to the top right.
-std::uint64_t turned(std::uint64_t code, int cells) {
-  std::uint64_t result = 0;
-  for (int row = 0; row < cells; ++row)
-    for (int column = 0; column < cells; ++column)
-      result = (result << 1) | std::uint64_t{bit_of(code, cells, cells - 1 - column, row)};
-  return result;
+// The same with the word for inverted colours.
+std::string with_inverted(const std::string& name) {
+  const std::size_t end = std::min(name.find(':'), name.size());
+  return name.substr(0, end) + std::string(k_inverted) + name.substr(end);
 }
 
-std::array<std::uint64_t, 4> four_turns(std::uint64_t code, int cells) {
-  std::array<std::uint64_t, 4> turns{code};
-  for (std::size_t k = 1; k < 4; ++k) turns[k] = turned(turns[k - 1], cells);
-  return turns;
-}
+// The smallest Hamming distance between two codes of a family in any rotation, or between a code and itself
+// turned: marker a, and marker b turned by k quarters.
+struct NearestCodes {
+  int distance = 64;
+  std::size_t a = 0, b = 0, k = 0;
+};
 
-// Smallest Hamming distance between any two codes in any rotation, and between a code and its own rotations.
-int smallest_distance(const CodeFamily& family) {
-  int smallest = family.cells * family.cells;
+NearestCodes nearest_codes(const CodeFamily& family) {
+  NearestCodes nearest{.distance = family.grid.bits};
+  const auto compare = [&](std::size_t a, std::size_t b, std::size_t k) {
+    const int distance = std::popcount(family.codes[a][0] ^ family.codes[b][k]);
+    if (distance < nearest.distance) nearest = {distance, a, b, k};
+  };
   for (std::size_t i = 0; i < family.codes.size(); ++i) {
-    for (std::size_t k = 1; k < 4; ++k)
-      smallest = std::min(smallest, std::popcount(family.codes[i][0] ^ family.codes[i][k]));
+    for (std::size_t k = 1; k < 4; ++k) compare(i, i, k);
     for (std::size_t j = 0; j < i; ++j)
-      for (std::size_t k = 0; k < 4; ++k)
-        smallest = std::min(smallest, std::popcount(family.codes[i][0] ^ family.codes[j][k]));
+      for (std::size_t k = 0; k < 4; ++k) compare(j, i, k);
   }
-  return smallest;
+  return nearest;
 }
 
 // Negative when even an error-free reading of the other bits does not determine the code.
 int correctable_errors(const CodeFamily& family, int distance, int hidden) {
-  const int bits = family.cells * family.cells - hidden;
+  const int bits = family.grid.bits - hidden;
   const int unique = distance > hidden ? (distance - hidden - 1) / 2 : -1;
   double words_with = 1;  // binomial(bits, errors)
   double words = 0;
@@ -82,11 +103,14 @@ int correctable_errors(const CodeFamily& family, int distance, int hidden) {
   }
 }
 
+// Whether random cells show one of the codes so often that no error can be corrected.
+bool is_dense(const CodeFamily& family) {
+  return 4 * static_cast<double>(family.codes.size()) > std::ldexp(k_max_random_hit, family.grid.bits);
+}
+
 // A code without errors is always read, whatever the family's size.
-std::vector<int> correctable_errors(const CodeFamily& family) {
-  const int bits = family.cells * family.cells;
-  if (4 * static_cast<double>(family.codes.size()) > std::ldexp(k_max_random_hit, bits)) return {0};
-  const int distance = smallest_distance(family);
+std::vector<int> correctable_errors(const CodeFamily& family, int distance) {
+  if (is_dense(family)) return {0};
   std::vector<int> errors = {std::max(0, correctable_errors(family, distance, 0))};
   for (int hidden = 1;; ++hidden) {
     const int more = correctable_errors(family, distance, hidden);
@@ -95,11 +119,23 @@ std::vector<int> correctable_errors(const CodeFamily& family) {
   }
 }
 
-CodeFamily from_opencv(const std::string& name, int index) {
-  const cv::Ptr<cv::aruco::Dictionary> dictionary = cv::aruco::getPredefinedDictionary(index);
+std::vector<int> correctable_errors(const CodeFamily& family) {
+  if (is_dense(family)) return {0};
+  const bool compared = family.codes.size() <= k_max_compared;
+  return correctable_errors(family, compared ? nearest_codes(family).distance : 1);
+}
+
+CodeFamily empty_family(const std::string& name, int cells) {
   CodeFamily family;
   family.name = name;
-  family.cells = dictionary->markerSize;
+  family.cells = cells;
+  family.grid = grid_inside_border(cells, 1);
+  return family;
+}
+
+CodeFamily from_opencv(const std::string& name, int index) {
+  const cv::Ptr<cv::aruco::Dictionary> dictionary = cv::aruco::getPredefinedDictionary(index);
+  CodeFamily family = empty_family(name, dictionary->markerSize);
   for (int id = 0; id < dictionary->bytesList.rows; ++id) {
     const cv::Mat bits =
         cv::aruco::Dictionary::getBitsFromByteList(dictionary->bytesList.rowRange(id, id + 1), family.cells);
@@ -107,19 +143,36 @@ CodeFamily from_opencv(const std::string& name, int index) {
     for (int row = 0; row < family.cells; ++row)
       for (int column = 0; column < family.cells; ++column)
         code = (code << 1) | std::uint64_t{bits.at<std::uint8_t>(row, column) != 0};
-    family.codes.push_back(four_turns(code, family.cells));
+    family.codes.push_back(four_turns(code, family.grid));
   }
   family.max_errors = correctable_errors(family);
   return family;
 }
 
-CodeFamily from_barcode(const Barcode& barcode) {
+CodeFamily from_mip(const std::string& name) {
+  CodeFamily family = empty_family(name, 6);
+  for (const std::uint64_t code : aruco_mip_36h12()) family.codes.push_back(four_turns(code, family.grid));
+  family.max_errors = correctable_errors(family);
+  return family;
+}
+
+CodeFamily from_apriltag3(const std::string& name) {
+  const ApriltagCodes source = apriltag3_codes(name);
   CodeFamily family;
-  family.name = barcode.name;
-  family.cells = barcode.cells;
+  family.name = name;
+  family.cells = source.grid.side() - 2;
+  family.grid = source.grid;
+  family.light_on_dark = true;
+  for (const std::uint64_t code : source.codes) family.codes.push_back(four_turns(code, family.grid));
+  family.max_errors = correctable_errors(family, source.distance);
+  return family;
+}
+
+CodeFamily from_barcode(const std::string& name, const Barcode& barcode) {
+  CodeFamily family = empty_family(name, barcode.cells);
   family.border_cells = 0.5 * barcode.cells;
   for (std::size_t id = 0; id < barcode.ids(); ++id)
-    family.codes.push_back(four_turns(barcode_cells(barcode, id), family.cells));
+    family.codes.push_back(four_turns(barcode_cells(barcode, id), family.grid));
   family.max_errors = correctable_errors(family);
   return family;
 }
@@ -132,6 +185,38 @@ Result<std::uint64_t> code_of_text(const std::string& text, int cells, const std
   std::uint64_t code = 0;
   for (const char c : text) code = (code << 1) | std::uint64_t{c == '1'};
   return code;
+}
+
+Error alike(const std::filesystem::path& path, std::size_t a, std::size_t b, std::size_t quarters) {
+  const std::string turned = quarters == 0 ? "" : fmt::format(" turned by {} degrees", 90 * quarters);
+  const std::string pair = a == b ? fmt::format("marker_{} looks the same{}", a, turned)
+                                  : fmt::format("marker_{} and marker_{}{} look the same", a, b, turned);
+  return error("{}: {}, expected markers that can be told apart. Give {} other cells.", path.string(), pair,
+               a == b ? "it" : "one of them");
+}
+
+// An error where two markers cannot be told apart, or a marker and itself turned; a warning where one or two
+// wrong cells make one of the other.
+Status check_distinct(const CodeFamily& family, const std::filesystem::path& path) {
+  std::map<std::uint64_t, std::size_t> known;  // the ids, by the code
+  for (std::size_t id = 0; id < family.codes.size(); ++id) {
+    const auto& turns = family.codes[id];
+    for (std::size_t k = 1; k < 4; ++k)
+      if (turns[k] == turns[0]) return alike(path, id, id, k);
+    for (std::size_t k = 0; k < 4; ++k)
+      if (const auto other = known.find(turns[k]); other != known.end())
+        return alike(path, other->second, id, k);
+    known.emplace(turns[0], id);
+  }
+  if (family.codes.size() > k_max_compared) return {};
+  constexpr int k_few = 2;
+  if (const NearestCodes near = nearest_codes(family); near.distance <= k_few)
+    log_warning(
+        "{}: marker_{} and marker_{}{} differ in {} of {} cells only: a wrong cell may be read as the other "
+        "marker. No wrong cell is corrected.",
+        path.string(), near.a, near.b, near.k == 0 ? "" : fmt::format(" turned by {} degrees", 90 * near.k),
+        near.distance, family.grid.bits);
+  return {};
 }
 
 Result<CodeFamily> load_dictionary(const std::filesystem::path& path) {
@@ -147,9 +232,7 @@ Result<CodeFamily> load_dictionary(const std::filesystem::path& path) {
     return error("{}: markersize: expected 3 to {}, found {}", path.string(), k_max_cells, *cells);
   if (*count < 1 || *count > k_max_codes)
     return error("{}: nmarkers: expected 1 to {}, found {}", path.string(), k_max_codes, *count);
-  CodeFamily family;
-  family.name = k_aruco_file + path.filename().string();
-  family.cells = *cells;
+  CodeFamily family = empty_family(k_aruco_file + path.filename().string(), *cells);
   for (int id = 0; id < *count; ++id) {
     const std::string key = "marker_" + std::to_string(id);
     const OpencvFile::Value* bits = file->find(key);
@@ -157,8 +240,9 @@ Result<CodeFamily> load_dictionary(const std::filesystem::path& path) {
       return error("{}: {}: expected a text of bits because nmarkers is {}, found none", path.string(), key,
                    *count);
     LIMN_TRY(const std::uint64_t code, code_of_text(bits->text, family.cells, path.string() + ": " + key));
-    family.codes.push_back(four_turns(code, family.cells));
+    family.codes.push_back(four_turns(code, family.grid));
   }
+  LIMN_TRY_STATUS(check_distinct(family, path));
   family.max_errors = correctable_errors(family);
   return family;
 }
@@ -205,21 +289,62 @@ std::vector<float> turned(const std::vector<float>& values, int size) {
   return result;
 }
 
+// The numbers of the first line that is not blank.
+std::size_t numbers_in_first_line(const std::string& text) {
+  std::istringstream lines(text);
+  std::string line;
+  bool only_numbers = true;
+  while (std::getline(lines, line))
+    if (const std::size_t count = numbers_in(line, &only_numbers).size(); count > 0) return count;
+  return 0;
+}
+
+// A template's file and the share of the square's side that its pattern is wide: `hiro.patt@0.8`.
+struct TemplateWord {
+  std::string file;
+  double ratio = 0.5;
+};
+
+Result<TemplateWord> template_word(const std::string& text) {
+  const auto at = text.rfind('@');
+  if (at == std::string::npos || at == 0 ||
+      text.find_first_not_of("0123456789.", at + 1) != std::string::npos)
+    return TemplateWord{text};
+  TemplateWord word{text.substr(0, at)};
+  const char* const end = text.data() + text.size();
+  const auto [rest, problem] = std::from_chars(text.data() + at + 1, end, word.ratio);
+  if (problem != std::errc{} || rest != end || !is_pattern_ratio(word.ratio))
+    return error(
+        "template \"{}\": expected the pattern's share of the square's side after @, {} to {}, found \"{}\"",
+        text, k_least_pattern_ratio, k_most_pattern_ratio, text.substr(at + 1));
+  return word;
+}
+
 Result<TemplatePattern> load_template(const std::filesystem::path& path) {
   LIMN_TRY(const std::string text, read_file(path));
   bool only_numbers = true;
   const std::vector<double> values = numbers_in(text, &only_numbers);
+  const auto lines = std::count(text.begin(), text.end(), '\n') + !text.ends_with('\n');
   if (!only_numbers)
     return error(
         "{}: expected numbers from 0 to 255 (an ARToolKit template), found something else after {} of them",
         path.string(), values.size());
-  // A file has four rotations of three colours each.
-  const int size = static_cast<int>(std::lround(std::sqrt(static_cast<double>(values.size()) / 12)));
-  if (size < 8 || size > k_max_template_size || values.size() != static_cast<std::size_t>(12 * size * size))
+  // A file has four rotations of three colours each, and a line for each row. Some programs write one line.
+  const auto columns = static_cast<int>(numbers_in_first_line(text));
+  const bool has_rows = columns <= k_max_template_size;
+  const int size =
+      has_rows ? columns : static_cast<int>(std::lround(std::sqrt(static_cast<double>(values.size()) / 12)));
+  if (size < 8 || size > k_max_template_size || values.size() != static_cast<std::size_t>(12 * size * size)) {
+    const int expected = size < 8 || size > k_max_template_size ? 16 : size;
     return error(
-        "{}: expected 3072 numbers (4 rotations x 3 colours x 16 x 16; or another square), found {}. The "
-        "file is cut short or is not an ARToolKit template.",
-        path.string(), values.size());
+        "{}: line {}: expected {} numbers before the file's end (4 rotations x 3 colours x {} x {}{}), found "
+        "{}. "
+        "The file is cut short or is not an ARToolKit template.",
+        path.string(), lines, 12 * expected * expected, expected, expected,
+        has_rows && size == expected ? ", as its first line has " + std::to_string(size)
+                                     : "; or another square",
+        values.size());
+  }
   TemplatePattern pattern;
   pattern.id = path.filename().string();
   pattern.size = size;
@@ -237,7 +362,19 @@ Result<TemplatePattern> load_template(const std::filesystem::path& path) {
   return pattern;
 }
 
-std::optional<std::string> file_after(const std::string& name, const std::string& prefix) {
+Result<TemplatePattern> load_template(const std::string& text,
+                                      bool inverted,
+                                      const std::filesystem::path& folder) {
+  LIMN_TRY(const TemplateWord word, template_word(text));
+  LIMN_TRY(TemplatePattern pattern, load_template(folder / word.file));
+  pattern.family = inverted ? with_inverted(k_artoolkit) : k_artoolkit;
+  pattern.id = std::filesystem::path(text).filename().string();
+  pattern.border = 0.5 * (1 - word.ratio);
+  pattern.light_on_dark = inverted;
+  return pattern;
+}
+
+std::optional<std::string> file_after(const std::string& name, std::string_view prefix) {
   if (name.rfind(prefix, 0) != 0 || name.size() == prefix.size()) return std::nullopt;
   return name.substr(prefix.size());
 }
@@ -256,26 +393,73 @@ cv::Mat drawn_barcode(const CodeFamily& family, std::size_t id, int pixels_per_h
     const int r = row - family.cells;
     const int c = column - family.cells;
     const bool inside = r >= 0 && c >= 0 && r < 2 * family.cells && c < 2 * family.cells;
-    return inside && bit_of(family.codes[id][0], family.cells, r / 2, c / 2) ? 255 : 0;
+    if (!inside) return 0;
+    return (family.codes[id][0] >> family.grid.at(r / 2 + 1, c / 2 + 1)) & 1 ? 255 : 0;
   });
 }
 
 cv::Mat drawn_code(const CodeFamily& family, std::size_t id, int pixels_per_cell) {
-  if (family.border_cells != 1) return drawn_barcode(family, id, pixels_per_cell);
-  return drawn_cells(family.cells + 2, pixels_per_cell, [&](int row, int column) -> std::uint8_t {
-    const bool border = row == 0 || column == 0 || row > family.cells || column > family.cells;
-    return !border && bit_of(family.codes[id][0], family.cells, row - 1, column - 1) ? 255 : 0;
+  if (is_barcode(family)) return drawn_barcode(family, id, pixels_per_cell);
+  return drawn_cells(family.grid.width, pixels_per_cell, [&](int row, int column) -> std::uint8_t {
+    const int cell = family.grid.at(row, column);
+    if (cell < 0) return cell == CodeGrid::k_dark ? 0 : 255;
+    return (family.codes[id][0] >> cell) & 1 ? 255 : 0;
   });
 }
 
+// The image is divided so finely that the border has whole cells.
 cv::Mat drawn_template(const TemplatePattern& pattern, int pixels_per_cell) {
-  const int border = pattern.size / 2;
-  return drawn_cells(2 * pattern.size, pixels_per_cell, [&](int row, int column) -> std::uint8_t {
+  constexpr int k_most_cells = 32;  // for each value
+  const double border_values = pattern.size * pattern.border / (1 - 2 * pattern.border);
+  int cells = 1;
+  while (cells < k_most_cells && std::abs(cells * border_values - std::round(cells * border_values)) > 1e-6)
+    ++cells;
+  const int border = static_cast<int>(std::lround(cells * border_values));
+  const int inner = cells * pattern.size;
+  return drawn_cells(inner + 2 * border, pixels_per_cell, [&](int row, int column) -> std::uint8_t {
     const int r = row - border;
     const int c = column - border;
-    const bool inside = r >= 0 && c >= 0 && r < pattern.size && c < pattern.size;
-    return inside ? pattern.grey[static_cast<std::size_t>(r * pattern.size + c)] : std::uint8_t{0};
+    const bool inside = r >= 0 && c >= 0 && r < inner && c < inner;
+    return inside ? pattern.grey[static_cast<std::size_t>(r / cells * pattern.size + c / cells)]
+                  : std::uint8_t{0};
   });
+}
+
+// Inverts a drawing of a square that is light on dark, with a dark ring around it unless it has rings of
+// cells.
+MarkerDrawing with_surroundings(cv::Mat image, int around_px, bool light_on_dark, int ring_px) {
+  if (!light_on_dark) return {image, around_px};
+  if (around_px == 0) {
+    cv::copyMakeBorder(image, image, ring_px, ring_px, ring_px, ring_px, cv::BORDER_CONSTANT,
+                       cv::Scalar(255));
+    around_px = ring_px;
+  }
+  cv::bitwise_not(image, image);
+  return {image, around_px};
+}
+
+bool is_template(const MarkerName& marker) { return without_inverted(marker.family).name == k_artoolkit; }
+
+// The family names that the marker is found by.
+std::string searched_name(const MarkerName& marker) {
+  return is_template(marker) ? marker.text() : marker.family;
+}
+
+CodeFamily with_wide_border(CodeFamily family) {
+  family.border_cells = 2;
+  family.grid = grid_inside_border(family.cells, 2);
+  return family;
+}
+
+Result<CodeFamily> load_codes(const std::string& name, const std::filesystem::path& folder) {
+  if (const PredefinedFamily* known = find_predefined_family(name))
+    return from_opencv(name, known->opencv_dictionary);
+  if (name == k_mip) return from_mip(name);
+  if (const auto known = apriltag3_families(); std::ranges::find(known, name) != known.end())
+    return from_apriltag3(name);
+  if (const Barcode* barcode = find_barcode(name)) return from_barcode(name, *barcode);
+  if (const auto file = file_after(name, k_aruco_file)) return load_dictionary(folder / *file);
+  return error("family \"{}\": expected one of {}", name, known_families());
 }
 
 // (1, 2, 1) / 4 over three rows, value by value.
@@ -311,54 +495,98 @@ std::vector<float> smoothed(std::vector<float> values, int size) {
   return values;
 }
 
+bool is_barcode(const CodeFamily& family) { return family.border_cells == 0.5 * family.cells; }
+
 Result<Families> Families::load(std::span<const std::string> names, const std::filesystem::path& folder) {
   Families families;
   std::set<std::string> seen;
   for (const std::string& name : names) {
     if (!seen.insert(name).second) continue;
-    if (const PredefinedFamily* known = find_predefined_family(name)) {
-      families.codes_.push_back(from_opencv(name, known->opencv_dictionary));
-    } else if (const Barcode* barcode = find_barcode(name)) {
-      families.codes_.push_back(from_barcode(*barcode));
-    } else if (const auto dictionary = file_after(name, k_aruco_file)) {
-      LIMN_TRY(CodeFamily family, load_dictionary(folder / *dictionary));
-      families.codes_.push_back(std::move(family));
-    } else if (const auto file = file_after(name, k_artoolkit)) {
-      LIMN_TRY(TemplatePattern pattern, load_template(folder / *file));
+    const FamilyWord word = without_inverted(name);
+    if (const auto file = file_after(word.name, std::string(k_artoolkit) + ":")) {
+      LIMN_TRY(TemplatePattern pattern, load_template(*file, word.inverted, folder));
       families.templates_.push_back(std::move(pattern));
-    } else {
-      return error("family \"{}\": expected one of {}", name, known_families());
+      continue;
     }
+    LIMN_TRY(CodeFamily family, load_codes(word.name, folder));
+    if (word.inverted) {
+      family.name = with_inverted(family.name);
+      family.light_on_dark = !family.light_on_dark;
+    }
+    const bool may_be_wide =
+        family.border_cells == 1 && family.grid.rings == 0 && family.cells >= k_min_wide_cells;
+    if (may_be_wide) families.wide_borders_.push_back(with_wide_border(family));
+    families.codes_.push_back(std::move(family));
   }
   return families;
+}
+
+Families Families::with_polarity(bool light_on_dark) const {
+  Families chosen;
+  const auto is_chosen = [&](const auto& item) { return item.light_on_dark == light_on_dark; };
+  std::ranges::copy_if(codes_, std::back_inserter(chosen.codes_), is_chosen);
+  std::ranges::copy_if(wide_borders_, std::back_inserter(chosen.wide_borders_), is_chosen);
+  std::ranges::copy_if(templates_, std::back_inserter(chosen.templates_), is_chosen);
+  return chosen;
+}
+
+bool Families::contains(const std::string& family) const {
+  return std::ranges::any_of(codes_, [&](const CodeFamily& codes) { return codes.name == family; }) ||
+         std::ranges::any_of(templates_,
+                             [&](const TemplatePattern& drawn) { return drawn.family == family; });
+}
+
+double Families::thinnest_border() const {
+  double least = 0.5;
+  for (const CodeFamily& family : codes_)
+    least = std::min(least, family.border_cells / (family.cells + 2 * family.border_cells));
+  for (const TemplatePattern& drawn : templates_) least = std::min(least, drawn.border);
+  return least;
+}
+
+double Families::reach() const {
+  double most = 0;
+  for (const CodeFamily& family : codes_)
+    most = std::max(most, static_cast<double>(family.grid.rings) / family.grid.side());
+  return most;
 }
 
 std::vector<std::string> families_of(std::span<const Body> bodies) {
   std::vector<std::string> names;
   for (const Body& body : bodies)
     for (const BodyMarker& marker : body.markers) {
-      const bool is_template = marker.marker.family + ":" == k_artoolkit;
-      std::string name = is_template ? marker.marker.text() : marker.marker.family;
+      std::string name = searched_name(marker.marker);
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(std::move(name));
     }
   return names;
 }
 
-Result<cv::Mat> draw_marker(const MarkerName& marker,
-                            int pixels_per_cell,
-                            const std::filesystem::path& folder) {
+Result<MarkerDrawing> draw_whole_marker(const MarkerName& marker,
+                                        int pixels_per_cell,
+                                        const std::filesystem::path& folder) {
   LIMN_CHECK(pixels_per_cell > 0);
-  const bool is_template = marker.family + ":" == k_artoolkit;
-  const std::vector<std::string> names = {is_template ? marker.text() : marker.family};
-  LIMN_TRY(const Families families, Families::load(names, folder));
-  if (is_template) return drawn_template(families.templates().front(), pixels_per_cell);
+  LIMN_TRY(const Families families, Families::load(std::vector{searched_name(marker)}, folder));
+  if (is_template(marker)) {
+    const TemplatePattern& pattern = families.templates().front();
+    const cv::Mat image = drawn_template(pattern, pixels_per_cell);
+    return with_surroundings(image, 0, pattern.light_on_dark, image.cols / 8);
+  }
   const CodeFamily& family = families.codes().front();
   std::size_t id = 0;
   const auto [rest, problem] = std::from_chars(marker.id.data(), marker.id.data() + marker.id.size(), id);
   if (problem != std::errc{} || rest != marker.id.data() + marker.id.size() || id >= family.codes.size())
     return error("marker {}: expected an id from 0 to {}, found \"{}\"", marker.text(),
                  family.codes.size() - 1, marker.id);
-  return drawn_code(family, id, pixels_per_cell);
+  return with_surroundings(drawn_code(family, id, pixels_per_cell), family.grid.rings * pixels_per_cell,
+                           family.light_on_dark, (is_barcode(family) ? 2 : 1) * pixels_per_cell);
+}
+
+Result<cv::Mat> draw_marker(const MarkerName& marker,
+                            int pixels_per_cell,
+                            const std::filesystem::path& folder) {
+  LIMN_TRY(const MarkerDrawing drawing, draw_whole_marker(marker, pixels_per_cell, folder));
+  const int side = drawing.image.cols - 2 * drawing.around_px;
+  return drawing.image(cv::Rect(drawing.around_px, drawing.around_px, side, side)).clone();
 }
 
 }  // namespace limn::tracker

@@ -34,38 +34,12 @@ constexpr double k_min_margin_few_bits = 0.5;
 constexpr double k_max_wrong_margin = 0.1;
 constexpr double k_uneven_paper = 1.3;            // brightest side over the second darkest
 constexpr double k_min_template_variance = 0.02;  // standard deviation of a fifteenth of black to white
-constexpr double k_sharpening = 0.25;             // weight of the Laplacian
 // Every bit of a barcode is data. Its code cannot reject clutter, so its light must: smallest and mean margin
 // of its cells, and the share of its border's places that may be light.
 constexpr double k_min_barcode_margin = 0.4;
 constexpr double k_min_mean_barcode_margin = 0.75;
 constexpr double k_barcode_border_errors = 0.02;
-
-// Removes blur from the four neighbours (outside the marker is white).
-void sharpen(int cells, Grid* grid) {
-  const Grid before = *grid;
-  const auto value = [&](int row, int column) {
-    const bool outside = row < 0 || column < 0 || row >= cells || column >= cells;
-    return outside ? 1.0 : before[static_cast<std::size_t>(row * cells + column)];
-  };
-  for (int row = 0; row < cells; ++row)
-    for (int column = 0; column < cells; ++column) {
-      const double here = value(row, column);
-      const double around =
-          value(row - 1, column) + value(row + 1, column) + value(row, column - 1) + value(row, column + 1);
-      (*grid)[static_cast<std::size_t>(row * cells + column)] = here + k_sharpening * (4 * here - around);
-    }
-}
-
-// Values of all cells, border included.
-Grid grid_of(const CellSamples& samples, double limit) {
-  Grid grid;
-  const auto count = static_cast<std::size_t>(samples.cells * samples.cells);
-  for (std::size_t i = 0; i < count; ++i)
-    grid[i] = mean_relative(&samples.fraction[i * samples.places()], samples.places(), limit);
-  if (!samples.several) sharpen(samples.cells, &grid);
-  return grid;
-}
+constexpr double k_quarter = 0.25;  // width of a barcode's border, as share of the side
 
 struct Bits {
   std::uint64_t code = 0;
@@ -75,27 +49,26 @@ struct Bits {
   int border_cells = 0;
 };
 
-Bits bits_of(const Grid& grid, int cells) {
+Bits bits_of(const Grid& values, const CodeGrid& grid) {
   Bits bits;
-  const int width = cells + 2;
-  int at = cells * cells;
-  for (int row = 0; row < width; ++row)
-    for (int column = 0; column < width; ++column) {
-      const double value = grid[static_cast<std::size_t>(row * width + column)];
-      if (row == 0 || column == 0 || row > cells || column > cells) {
+  std::size_t at = 0;
+  for (int row = 0; row < grid.width; ++row)
+    for (int column = 0; column < grid.width; ++column, ++at) {
+      const int cell = grid.cells[at];
+      const double value = values[at];
+      if (cell == CodeGrid::k_unused) continue;
+      if (cell < 0) {
         ++bits.border_cells;
-        bits.border_errors += value > 0;
+        bits.border_errors += (value > 0) != (cell == CodeGrid::k_light);
         continue;
       }
-      bits.code = (bits.code << 1) | std::uint64_t{value > 0};
+      bits.code |= std::uint64_t{value > 0} << cell;
       const double margin = std::min(1.0, std::abs(value));
-      bits.margin[static_cast<std::size_t>(--at)] = margin;
-      bits.mean_margin += margin / (cells * cells);
+      bits.margin[static_cast<std::size_t>(cell)] = margin;
+      bits.mean_margin += margin / grid.bits;
     }
   return bits;
 }
-
-bool is_barcode(const CodeFamily& family) { return family.border_cells != 1; }
 
 struct Nearest {
   std::size_t id = 0, rotation = 0;
@@ -119,13 +92,16 @@ LIMN_POPCOUNT Nearest nearest(const std::vector<std::array<std::uint64_t, 4>>& c
 
 SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   SeenCells cells;
+  const CodeGrid& grid = family.grid;
   // A barcode's border is not always a whole number of cells.
-  if (is_barcode(family)) return cells;
-  cells.count = family.cells + 2;
-  int bit = family.cells * family.cells;
-  for (int row = 1; row <= family.cells; ++row)
-    for (int column = 1; column <= family.cells; ++column)
-      cells.white[static_cast<std::size_t>(row * cells.count + column)] = (code >> --bit) & 1;
+  if (is_barcode(family) || grid.side() > static_cast<int>(SeenCells::k_max)) return cells;
+  cells.count = grid.side();
+  std::size_t at = 0;
+  for (int row = 0; row < cells.count; ++row)
+    for (int column = 0; column < cells.count; ++column) {
+      const int cell = grid.at(row + grid.rings, column + grid.rings);
+      cells.white[at++] = cell >= 0 ? (code >> cell) & 1 : cell != CodeGrid::k_dark;
+    }
   return cells;
 }
 
@@ -144,21 +120,25 @@ double margin_of(const Bits& bits, std::uint64_t chosen) {
   return sum;
 }
 
-// The code other than `code` that would need the least margin of wrong bits, of any family with the same
-// geometry of cells.
-LIMN_POPCOUNT std::uint64_t next_code(const Families& families,
+bool have_same_cells(const CodeFamily& a, const CodeFamily& b) {
+  return a.cells == b.cells && a.border_cells == b.border_cells && a.grid.cells == b.grid.cells;
+}
+
+// The code other than `code` that would need the least margin of wrong bits, of any of the families with the
+// same geometry of cells.
+LIMN_POPCOUNT std::uint64_t next_code(const std::vector<CodeFamily>& families,
                                       const CodeFamily& family,
                                       const Bits& bits,
                                       std::uint64_t code) {
-  const auto count = static_cast<std::size_t>(family.cells * family.cells);
+  const auto count = static_cast<std::size_t>(family.grid.bits);
   std::array<double, 65> least{};  // smallest sum of margins, by the number of wrong bits
   std::copy_n(bits.margin.begin(), count, least.begin() + 1);
   std::sort(least.begin() + 1, least.begin() + 1 + static_cast<std::ptrdiff_t>(count));
   for (std::size_t i = 1; i <= count; ++i) least[i] += least[i - 1];
   std::uint64_t next = ~code & ((std::uint64_t{1} << count) - 1);
   double wrong = least[count] + 1;
-  for (const CodeFamily& like : families.codes()) {
-    if (like.cells != family.cells || like.border_cells != family.border_cells) continue;
+  for (const CodeFamily& like : families) {
+    if (!have_same_cells(like, family)) continue;
     for (const auto& turns : like.codes)
       for (const std::uint64_t other : turns) {
         const std::uint64_t differing = other ^ bits.code;
@@ -182,13 +162,13 @@ double random_hit(const CodeFamily& family, int readable, int errors) {
   return std::min(1.0, 4 * static_cast<double>(family.codes.size()) * words / std::ldexp(1.0, readable));
 }
 
-bool read_code(const Families& families,
+bool read_code(const std::vector<CodeFamily>& families,
                const CodeFamily& family,
                const Bits& bits,
                double limit,
                std::uint64_t readable,
                Readings* readings) {
-  const int count = family.cells * family.cells;
+  const int count = family.grid.bits;
   const auto hidden = static_cast<std::size_t>(count - std::popcount(readable));
   if (hidden >= family.max_errors.size()) return false;
   const Nearest best = nearest(family.codes, bits.code, readable);
@@ -204,13 +184,13 @@ bool read_code(const Families& families,
   return true;
 }
 
-void read_code(const Families& families,
+void read_code(const std::vector<CodeFamily>& families,
                const CodeFamily& family,
                const Bits& bits,
                double limit,
                Reading reading,
                Readings* readings) {
-  const int count = family.cells * family.cells;
+  const int count = family.grid.bits;
   const bool few = count <= k_few_bits;
   const bool covered = reading == Reading::covered;
   if (covered && !can_be_covered(family)) return;
@@ -229,10 +209,11 @@ void read_code(const Families& families,
 }
 
 // Whether the whole border is dark, near its outer edge and near the cells, where other families have cells.
-bool is_border_dark(const QuadReader& reader) {
+// `border` is its width as share of the side.
+bool is_border_dark(const QuadReader& reader, double border) {
   constexpr int k_places = 24;  // places along a side
   Places places;
-  for (const double inset : {0.08, 0.19})
+  for (const double inset : {0.32 * border, 0.76 * border})
     for (int i = 0; i < k_places; ++i) {
       const double along = inset + (1 - 2 * inset) * i / k_places;
       places.add(along, inset);
@@ -243,20 +224,36 @@ bool is_border_dark(const QuadReader& reader) {
   return reader.light_places(places) <= k_barcode_border_errors * 8 * k_places;
 }
 
+// Whether the border is dark where a border of two cells has its inner ring, for 5 x 5 to 7 x 7 cells. Other
+// markers with so many cells have cells there.
+bool has_wide_border(const QuadReader& reader) {
+  constexpr int k_places = 6;  // places along a side
+  constexpr double k_inset = 0.15;
+  Places places;
+  for (int i = 0; i < k_places; ++i) {
+    const double along = k_inset + (1 - 2 * k_inset) * i / k_places;
+    places.add(along, k_inset);
+    places.add(1 - k_inset, along);
+    places.add(1 - along, 1 - k_inset);
+    places.add(k_inset, 1 - along);
+  }
+  return reader.light_places(places) <= 2;
+}
+
 Bits barcode_bits(const QuadReader& reader, const CodeFamily& family) {
   CellSamples samples;
-  reader.read_barcode(family, &samples);
-  return bits_of(grid_of(samples, k_middle), family.cells);
+  reader.read_inside(family.cells, family.border_cells, &samples);
+  return bits_of(grid_of(samples, k_middle), family.grid);
 }
 
 void read_barcodes(const QuadReader& reader, const Families& families, Readings* readings) {
   for (const CodeFamily& family : families.codes()) {
     if (!is_barcode(family)) continue;
     const Bits bits = barcode_bits(reader, family);
-    const auto least =
-        std::min_element(bits.margin.begin(), bits.margin.begin() + family.cells * family.cells);
+    const auto least = std::min_element(bits.margin.begin(), bits.margin.begin() + family.grid.bits);
     if (*least < k_min_barcode_margin || bits.mean_margin < k_min_mean_barcode_margin) continue;
-    if (is_border_dark(reader)) read_code(families, family, bits, k_middle, Reading::open, readings);
+    if (is_border_dark(reader, k_quarter))
+      read_code(families.codes(), family, bits, k_middle, Reading::open, readings);
   }
 }
 
@@ -271,15 +268,17 @@ void add_rival_barcodes(const QuadReader& reader, const Families& families, Read
   }
 }
 
-// Whether there is a template's border, a quarter of the side wide: dark at 12 places of its middle ring.
-bool has_template_border(const QuadReader& reader) {
+// Whether there is a template's border of that width (share of the side): dark at 12 places of its middle
+// ring.
+bool has_template_border(const QuadReader& reader, double border) {
   Places places;
+  const double middle = 0.5 * border;
   for (int i = 0; i < 3; ++i) {
     const double along = 0.2 + 0.3 * i;
-    places.add(along, 0.125);
-    places.add(along, 0.875);
-    places.add(0.125, along);
-    places.add(0.875, along);
+    places.add(along, middle);
+    places.add(along, 1 - middle);
+    places.add(middle, along);
+    places.add(1 - middle, along);
   }
   return reader.light_places(places) <= 1;
 }
@@ -290,15 +289,17 @@ double correlation(const std::vector<float>& a, const std::vector<float>& b) {
   return sum;
 }
 
-// The inner half as size x size values, smoothed, with zero mean and unit length; empty when it is flat.
-std::vector<float> read_inner_half(const QuadReader& reader, int size) {
+// The inside of a template's border as size x size values, smoothed, with zero mean and unit length; empty
+// when it is flat.
+std::vector<float> read_inside(const QuadReader& reader, int size, double border) {
   std::vector<float> values;
-  const double cells = 2.0 * size;
+  const double cells = size / (1 - 2 * border);  // along the square's side
   const bool several = reader.side_px / cells > 2;
+  const auto middle = [&](int i) { return border + (i + 0.5) / cells; };
   for (int row = 0; row < size; ++row) {
     Places places;
     for (int column = 0; column < size; ++column)
-      places.add_cell((column + size / 2 + 0.5) / cells, (row + size / 2 + 0.5) / cells, cells, several);
+      places.add_cell(middle(column), middle(row), cells, several);
     Fractions fractions;
     reader.fractions(places, &fractions);
     const std::size_t each = several ? 5 : 1;
@@ -318,14 +319,16 @@ std::vector<float> read_inner_half(const QuadReader& reader, int size) {
 void read_templates(const QuadReader& reader,
                     const std::vector<TemplatePattern>& templates,
                     Readings* readings) {
-  if (templates.empty() || !has_template_border(reader)) return;
-  std::map<int, std::vector<float>> seen;  // by the template's size
+  if (templates.empty()) return;
+  std::map<std::pair<int, double>, std::vector<float>> seen;  // by the template's size and border
   std::vector<std::pair<double, Pattern>> alike;
   std::optional<Readings::Accepted> best;
   double most = 0;
   for (const TemplatePattern& drawn : templates) {
-    if (!seen.contains(drawn.size)) seen[drawn.size] = read_inner_half(reader, drawn.size);
-    const std::vector<float>& values = seen[drawn.size];
+    const auto [found, is_new] = seen.try_emplace({drawn.size, drawn.border});
+    std::vector<float>& values = found->second;
+    if (is_new && has_template_border(reader, drawn.border))
+      values = read_inside(reader, drawn.size, drawn.border);
     if (values.empty()) continue;
     std::array<double, 4> turns;
     for (std::size_t k = 0; k < 4; ++k) {
@@ -337,7 +340,7 @@ void read_templates(const QuadReader& reader,
     if (turns[3] < k_min_correlation || turns[3] - turns[2] < k_min_rotation_lead) continue;
     if (turns[3] <= most) continue;
     most = turns[3];
-    best = {{{"artoolkit", drawn.id}, top, 0, {}}, pattern_of(drawn, top), k_middle, 1};
+    best = {{{drawn.family, drawn.id}, top, 0, {}}, pattern_of(drawn, top), k_middle, 1};
   }
   if (best) readings->accepted.push_back(*best);
   // The two most similar of all templates and their rotations; one of them may be the best itself.
@@ -347,16 +350,23 @@ void read_templates(const QuadReader& reader,
   for (auto other = alike.begin(); other != two; ++other) readings->others.push_back(other->second);
 }
 
-void read_codes(const QuadReader& reader, const Families& families, Reading reading, Readings* readings) {
+void read_codes(const QuadReader& reader,
+                const std::vector<CodeFamily>& families,
+                Reading reading,
+                Readings* readings) {
   const std::size_t limits = reading == Reading::open ? 1 : k_limits.size();
   CellSamples samples;
   std::array<Bits, k_limits.size()> bits;
-  for (const CodeFamily& family : families.codes()) {
+  const CodeFamily* last = nullptr;
+  for (const CodeFamily& family : families) {
     if (is_barcode(family)) continue;
-    const bool is_read = samples.cells == family.cells + 2;
-    if (!is_read) reader.read(family.cells + 2, &samples);
+    const CodeGrid& grid = family.grid;
+    const bool is_read = samples.cells == grid.width && samples.rings == grid.rings;
+    if (!is_read) reader.read(grid.width, grid.rings, &samples);
+    const bool has_bits = last && have_same_cells(*last, family);
+    last = &family;
     for (std::size_t i = 0; i < limits; ++i) {
-      if (!is_read) bits[i] = bits_of(grid_of(samples, k_limits[i]), family.cells);
+      if (!has_bits) bits[i] = bits_of(grid_of(samples, k_limits[i]), grid);
       read_code(families, family, bits[i], k_limits[i], reading, readings);
     }
   }
@@ -369,25 +379,29 @@ std::optional<Identity> read(const QuadReader& reader,
   std::array<std::byte, 1 << 14> buffer;  // enough in nearly all cases
   std::pmr::monotonic_buffer_resource memory(buffer.data(), buffer.size());
   Readings readings(certainty, &memory);
-  read_codes(reader, families, reading, &readings);
+  read_codes(reader, families.codes(), reading, &readings);
   if (reading == Reading::open) {
     read_barcodes(reader, families, &readings);
     read_templates(reader, families.templates(), &readings);
     if (!readings.accepted.empty() && certainty == Certainty::weighed)
       add_rival_barcodes(reader, families, &readings);
   }
-  return choose_reading(reader, readings);
+  if (auto chosen = choose_reading(reader, readings)) return chosen;
+  if (families.wide_borders().empty() || !has_wide_border(reader)) return std::nullopt;
+  Readings wide(certainty, &memory);
+  read_codes(reader, families.wide_borders(), reading, &wide);
+  return choose_reading(reader, wide);
 }
 
 }  // namespace
 }  // namespace identity
 
 bool can_be_covered(const CodeFamily& family) {
-  return !identity::is_barcode(family) && family.max_errors.size() > 1;
+  return !is_barcode(family) && family.grid.rings == 0 && family.max_errors.size() > 1;
 }
 
-bool has_quarter_border(const cv::Mat& grey, const RefinedQuad& quad) {
-  return identity::is_border_dark(identity::QuadReader(grey, quad));
+bool has_dark_border(const cv::Mat& grey, const RefinedQuad& quad, double border) {
+  return identity::is_border_dark(identity::QuadReader(grey, quad, 0), border);
 }
 
 std::optional<Identity> identify(const cv::Mat& grey,
@@ -395,9 +409,11 @@ std::optional<Identity> identify(const cv::Mat& grey,
                                  const Families& families,
                                  Reading reading,
                                  Certainty certainty) {
+  const double beyond = families.reach();
   if (reading == Reading::covered)
-    return identity::read(identity::QuadReader(grey, quad), families, reading, certainty);
-  if (const auto found = identity::read(identity::QuadReader(grey, quad), families, reading, certainty))
+    return identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty);
+  if (const auto found =
+          identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty))
     return found;
   // Something brighter than the paper may lie behind one side: use the level of the second darkest side for
   // all.
@@ -406,7 +422,7 @@ std::optional<Identity> identify(const cv::Mat& grey,
   if (levels[3] < identity::k_uneven_paper * levels[1]) return std::nullopt;
   RefinedQuad even = quad;
   even.outside_level.fill(levels[1]);
-  return identity::read(identity::QuadReader(grey, even), families, reading, certainty);
+  return identity::read(identity::QuadReader(grey, even, beyond), families, reading, certainty);
 }
 
 }  // namespace limn::tracker

@@ -23,9 +23,9 @@ struct Identity {
 constexpr double k_min_correlation = 0.65;  // the tests show the numbers of the real Hiro frame
 constexpr double k_min_rotation_lead = 0.1;
 
-/// Whether a black border a quarter of the side wide runs all around, as in ARToolKit's barcodes and
+/// Whether a black border of that width (share of the side) runs all around, as in ARToolKit's barcodes and
 /// templates.
-bool has_quarter_border(const cv::Mat& grey, const RefinedQuad& quad);
+bool has_dark_border(const cv::Mat& grey, const RefinedQuad& quad, double border);
 
 /// What may be assumed when a quad is read.
 enum class Reading {
@@ -34,7 +34,7 @@ enum class Reading {
 };
 
 /// Whether codes of the family are read where cells are hidden. Families with few bits are not, because
-/// clutter shows some of their codes by chance.
+/// clutter shows some of their codes by chance, and neither are those with cells around their square.
 bool can_be_covered(const CodeFamily& family);
 
 /// Whether an identity's score is computed.
@@ -50,7 +50,8 @@ constexpr double k_min_confidence = 0.9;
 /// and white comes from the levels beside the four edges, as a plane over the marker, so that a gradient of
 /// light does no harm. Of all patterns that a family accepts, the one that explains the whole square best is
 /// the marker. Its score is the probability that it is right. The alternatives are the next best pattern of
-/// any family, rotation or template, and something unknown. tests/bench/id_bench checks both.
+/// any family, rotation or template, a code in another grid of cells, and something unknown.
+/// tests/bench/id_bench checks both.
 std::optional<Identity> identify(const cv::Mat& grey,
                                  const RefinedQuad& quad,
                                  const Families& families,

@@ -46,8 +46,9 @@ std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
 
 }  // namespace
 
-bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
-  constexpr float k_inset = 0.07F;  // inside the border of every family (a ninth or more)
+bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast, double border) {
+  constexpr float k_inset = 0.07F;  // inside the border of every code (a ninth or more)
+  constexpr double k_thin = 0.1;    // templates may have thinner ones, and are read in their middle
   constexpr std::size_t k_border = 20, k_inside = 25;
   static constexpr auto k_at = [] {
     std::array<std::array<float, k_border + k_inside>, 2> at{};
@@ -62,7 +63,17 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast) {
         add(0.2F + 0.15F * static_cast<float>(column), 0.2F + 0.15F * static_cast<float>(row));
     return at;
   }();
-  const auto levels = nearest_levels(grey, quad, k_at);
+  const auto at_thin_border = [&] {
+    auto at = k_at;
+    for (auto& coordinates : at)
+      for (std::size_t i = 0; i < k_border; ++i) {
+        if (coordinates[i] == k_inset) coordinates[i] = static_cast<float>(0.5 * border);
+        if (coordinates[i] == 1 - k_inset) coordinates[i] = static_cast<float>(1 - 0.5 * border);
+      }
+    return at;
+  };
+  const auto levels =
+      border < k_thin ? nearest_levels(grey, quad, at_thin_border()) : nearest_levels(grey, quad, k_at);
   const auto inside = levels.begin() + k_border;
   const int lightest = *std::max_element(inside, levels.end());
   const int middle = level_of_rank(levels.data(), k_border, k_border / 2);

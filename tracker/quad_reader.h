@@ -15,7 +15,6 @@
 /// Reads the light inside a quad, relative to the levels beside its edges. For tracker/identify.cpp.
 namespace limn::tracker::identity {
 
-constexpr int k_max_grid = 9;             // 7 cells and the border
 constexpr double k_brightest = 2;         // bound on brightness, so that glare counts no more than this
 constexpr double k_sharpen_below_px = 4;  // smaller cells blur into each other
 
@@ -51,7 +50,7 @@ struct Places {
 };
 
 using Fractions = std::array<float, QuadSampler::k_most>;
-using Grid = std::array<double, k_max_grid * k_max_grid>;
+using Grid = std::array<double, CodeGrid::k_max_width * CodeGrid::k_max_width>;
 
 // The limits between black and white that are tried. It is the middle, or lower where a shadow crosses: white
 // paper in the shadow must be lighter than the ink in the light (a shadow 4 times darker and ink 7 times
@@ -62,12 +61,13 @@ constexpr std::array<double, 3> k_limits = {k_middle, 0.35, 0.22};
 // Samples as fractions of the way from black to white, at one or five places of every cell, border included.
 struct CellSamples {
   int cells = 0;  // cells along a side, border included
+  int rings = 0;  // of these, outside of the square
   bool several = false;
   Fractions fraction;
 
   std::size_t places() const { return several ? 5 : 1; }
 };
-static_assert(5 * k_max_grid * k_max_grid <= QuadSampler::k_most);
+static_assert(5 * CodeGrid::k_max_width * CodeGrid::k_max_width <= QuadSampler::k_most);
 
 // -1 at black, 0 at the limit, 1 as far above the limit as black is below it.
 inline float relative(float fraction, float limit) {
@@ -80,17 +80,23 @@ inline float relative(float fraction, float limit) {
 /// Mean of relative() over the places of one cell.
 double mean_relative(const float* fractions, std::size_t places, double limit);
 
+/// Values of all cells, border included. Where there is one sample in a cell, blur from the neighbours is
+/// removed.
+Grid grid_of(const CellSamples& samples, double limit);
+
 // Reads one quad, relative to the levels inside and outside its edges.
 struct QuadReader {
   QuadSampler levels;
   Plane light, dark;
-  double side_px;
+  double side_px, blur_px;
 
-  QuadReader(const cv::Mat& image, const RefinedQuad& quad)
-      : levels(image, quad.corners_px),
+  // `beyond`: how far outside of the square there are places to read, as share of its side.
+  QuadReader(const cv::Mat& image, const RefinedQuad& quad, double beyond)
+      : levels(image, quad.corners_px, beyond),
         light(quad.outside_level),
         dark(quad.inside_level),
-        side_px(std::sqrt(area(quad.corners_px))) {}
+        side_px(std::sqrt(area(quad.corners_px))),
+        blur_px(*std::max_element(quad.blur_px.begin(), quad.blur_px.end())) {}
 
   static double area(const std::array<Eigen::Vector2d, 4>& q) {
     const Eigen::Vector2d a = q[2] - q[0];
@@ -110,21 +116,24 @@ struct QuadReader {
                                           [](float fraction) { return fraction > k_middle; }));
   }
 
-  void read(int cells, CellSamples* samples) const {
+  // `width` cells along a side, of which `rings` lie outside of the square.
+  void read(int width, int rings, CellSamples* samples) const {
+    const int side = width - 2 * rings;
+    samples->rings = rings;
     read_cells(
-        cells, cells, [&](int i) { return (i + 0.5) / cells; }, samples);
+        width, side, [&](int i) { return (i - rings + 0.5) / side; }, samples);
   }
 
-  // For a family whose border is wider than a cell: the border counts as one ring of cells, read in its
-  // middle.
-  void read_barcode(const CodeFamily& family, CellSamples* samples) const {
-    const double side_cells = family.cells + 2 * family.border_cells;
+  // For a border that is no whole number of cells wide: it counts as one ring of cells, read in its middle.
+  void read_inside(int inner_cells, double border_cells, CellSamples* samples) const {
+    const double side_cells = inner_cells + 2 * border_cells;
     const auto middle = [&](int i) {
-      if (i == 0) return 0.5 * family.border_cells / side_cells;
-      if (i > family.cells) return 1 - 0.5 * family.border_cells / side_cells;
-      return (family.border_cells + i - 0.5) / side_cells;
+      if (i == 0) return 0.5 * border_cells / side_cells;
+      if (i > inner_cells) return 1 - 0.5 * border_cells / side_cells;
+      return (border_cells + i - 0.5) / side_cells;
     };
-    read_cells(family.cells + 2, side_cells, middle, samples);
+    samples->rings = 0;
+    read_cells(inner_cells + 2, side_cells, middle, samples);
   }
 
  private:

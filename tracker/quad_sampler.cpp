@@ -73,7 +73,9 @@ LIMN_SIMD void interpolate(const Neighbours& levels,
 
 }  // namespace
 
-QuadSampler::QuadSampler(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>& corners_px) {
+QuadSampler::QuadSampler(const cv::Mat& grey,
+                         const std::array<Eigen::Vector2d, 4>& corners_px,
+                         double beyond) {
   const int last_x = std::max(0, grey.cols - 2), last_y = std::max(0, grey.rows - 2);
   const auto [left, right] =
       std::minmax({corners_px[0].x(), corners_px[1].x(), corners_px[2].x(), corners_px[3].x()});
@@ -82,7 +84,9 @@ QuadSampler::QuadSampler(const cv::Mat& grey, const std::array<Eigen::Vector2d, 
   const auto first = [](double lowest, int last) {
     return lowest > 0 ? static_cast<int>(std::min(lowest, static_cast<double>(last))) : 0;
   };
-  const int x0 = first(left, last_x), y0 = first(top, last_y);
+  // Perspective may show what lies outside larger than the square itself.
+  const double around = 2 * beyond * std::max(right - left, bottom - top);
+  const int x0 = first(left - around, last_x), y0 = first(top - around, last_y);
   std::array<Eigen::Vector2d, 4> corners = corners_px;
   for (Eigen::Vector2d& corner : corners) corner -= Eigen::Vector2d(x0, y0);
   const Eigen::Matrix3d m = SquareToQuad(corners).matrix();

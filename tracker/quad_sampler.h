@@ -14,11 +14,11 @@ namespace limn::tracker {
 class QuadSampler {
  public:
   /// Largest number of places in one call.
-  static constexpr std::size_t k_most = 512;
+  static constexpr std::size_t k_most = 608;
 
   /// `corners_px` are the pixels of (0, 0), (1, 0), (1, 1) and (0, 1). `grey`, 8-bit and not empty, must
-  /// outlive this object.
-  QuadSampler(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>& corners_px);
+  /// outlive this object. `beyond`: how far outside of the unit square there are places to sample.
+  QuadSampler(const cv::Mat& grey, const std::array<Eigen::Vector2d, 4>& corners_px, double beyond = 0);
 
   /// Levels of the nearest pixels.
   void nearest(std::span<const float> x, std::span<const float> y, std::uint8_t* levels) const;

@@ -19,29 +19,48 @@ struct Pattern {
   std::uint64_t code = 0;
   const TemplatePattern* drawn = nullptr;  // a template instead of a code
   std::size_t rotation = 0;                // the template's
+  const CodeGrid* grid = nullptr;          // of a code with cells around its square
 
   bool operator==(const Pattern&) const = default;
 
-  // The row (or column) of cells at a share of the side; -1 in the border.
+  static constexpr int k_in_border = -1, k_beside = -2;
+  // The row (or column) of cells at a share of the side, or one of the above.
   int cell_at(double share) const {
+    if (grid) {
+      const double place = share * grid->side() + grid->rings;
+      return place < 0 || place >= grid->width ? k_beside : static_cast<int>(place);
+    }
+    if (share < 0 || share > 1) return k_beside;
     const double place = share * (cells + 2 * border) - border;
-    return place < 0 || place >= cells ? -1 : static_cast<int>(place);
+    return place < 0 || place >= cells ? k_in_border : static_cast<int>(place);
   }
-  // Value of a cell, -1 black … 1 white.
+  // Value of a cell, -1 black … 1 white, 0 unknown.
   float value(int row, int column) const {
+    if (row == k_beside || column == k_beside) return grid ? 0 : 1;
     if (row < 0 || column < 0) return -1;
+    if (grid) return value_of(grid->at(row, column));
     const int columns = static_cast<int>(cells);
     if (!drawn) return (code >> (columns * columns - 1 - (row * columns + column))) & 1 ? 1 : -1;
     for (std::size_t k = 0; k < rotation; ++k) row = columns - 1 - std::exchange(column, row);
     return static_cast<float>(drawn->grey[static_cast<std::size_t>(row * columns + column)] / 127.5 - 1);
   }
+  // How far it reaches beyond the square, as share of the side.
+  double reach() const { return grid ? static_cast<double>(grid->rings) / grid->side() : 0; }
+
+ private:
+  float value_of(std::int8_t cell) const {
+    if (cell >= 0) return (code >> cell) & 1 ? 1 : -1;
+    return cell == CodeGrid::k_dark ? -1 : cell == CodeGrid::k_light ? 1 : 0;
+  }
 };
 
 inline Pattern pattern_of(const CodeFamily& family, std::uint64_t code) {
-  return {family.border_cells, static_cast<double>(family.cells), code, nullptr, 0};
+  const CodeGrid* const grid = family.grid.rings > 0 ? &family.grid : nullptr;
+  return {family.border_cells, static_cast<double>(family.cells), code, nullptr, 0, grid};
 }
 inline Pattern pattern_of(const TemplatePattern& drawn, std::size_t rotation) {
-  return {0.5 * drawn.size, static_cast<double>(drawn.size), 0, &drawn, rotation};
+  const double border = drawn.size * drawn.border / (1 - 2 * drawn.border);
+  return {border, static_cast<double>(drawn.size), 0, &drawn, rotation};
 }
 
 // The patterns accepted in a quad, and rival patterns that it might show instead.

@@ -124,10 +124,13 @@ EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
 
 }  // namespace
 
-EdgeRefiner::EdgeRefiner(Encoding encoding) {
-  for (std::size_t level = 0; level < light_.size(); ++level) {
-    const double value = static_cast<double>(level);
-    light_[level] = encoding == Encoding::linear ? value : 255 * linear_from_srgb(value / 255);
+EdgeRefiner::EdgeRefiner(Encoding encoding, bool is_inverted) {
+  const auto light_of = [&](double level) {
+    return encoding == Encoding::linear ? level : 255 * linear_from_srgb(level / 255);
+  };
+  for (std::size_t i = 0; i < light_.size(); ++i) {
+    const double level = static_cast<double>(i);
+    light_[i] = is_inverted ? 255 - light_of(255 - level) : light_of(level);
   }
 }
 

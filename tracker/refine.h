@@ -54,8 +54,8 @@ struct RefinedQuad {
 class EdgeRefiner {
  public:
   /// Centroids are computed in linear light, because a pixel half covered by ink does not have the middle
-  /// level of an encoded image.
-  explicit EdgeRefiner(Encoding encoding = Encoding::linear);
+  /// level of an encoded image. `is_inverted`: the image's levels are 255 minus the camera's.
+  explicit EdgeRefiner(Encoding encoding = Encoding::linear, bool is_inverted = false);
 
   /// nullopt when a side has no edge from light outside to dark inside of at least `min_contrast` levels.
   std::optional<RefinedQuad> refine(const cv::Mat& grey,

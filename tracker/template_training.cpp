@@ -20,10 +20,9 @@ namespace {
 
 constexpr int k_min_contrast = 32;      // levels: training images have good contrast
 constexpr double k_min_search_px = 20;  // side; smaller frames cannot be read
-constexpr double k_min_side_px = 64;    // two pixels for each value
+constexpr double k_min_value_px = 2;    // two pixels for each value
 // Grey levels: identify's smallest, a fifteenth of black to white.
 constexpr double k_min_deviation = 15;
-constexpr double k_border = 0.25;  // share of the side, as the detector reads it
 
 double area(const std::array<Eigen::Vector2d, 4>& q) {
   const Eigen::Vector2d a = q[2] - q[0];
@@ -42,7 +41,8 @@ bool contains(const std::array<Eigen::Vector2d, 4>& q, const Eigen::Vector2d& px
   return true;
 }
 
-std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
+// `border`: its width as share of the side.
+std::vector<RefinedQuad> frames_in(const cv::Mat& grey, double border) {
   Threshold threshold;
   CornerCodes codes;
   QuadFinder finder;
@@ -51,9 +51,9 @@ std::vector<RefinedQuad> frames_in(const cv::Mat& grey) {
   EdgeRefiner refiner;
   std::vector<RefinedQuad> frames;
   finder.find(codes, {k_min_search_px}, [&](const Quad& quad) {
-    if (!may_be_marker(grey, quad, k_min_contrast)) return;
+    if (!may_be_marker(grey, quad, k_min_contrast, border)) return;
     const auto refined = refiner.refine(grey, quad, k_min_contrast, nullptr);
-    if (refined && has_quarter_border(grey, *refined)) frames.push_back(*refined);
+    if (refined && has_dark_border(grey, *refined, border)) frames.push_back(*refined);
   });
   std::sort(frames.begin(), frames.end(), [](const RefinedQuad& a, const RefinedQuad& b) {
     return area(a.corners_px) > area(b.corners_px);
@@ -95,16 +95,16 @@ Error several(const std::vector<RefinedQuad>& frames) {
 }
 
 // The upright inside of the frame, one pixel for each value, as the mean over the value's area.
-cv::Mat rectified(const cv::Mat& image, const RefinedQuad& frame, double side_px) {
+cv::Mat rectified(const cv::Mat& image, const RefinedQuad& frame, double border, double side_px) {
   const int size = TrainedTemplate::k_size;
   // Places along each value.
-  const int fine = std::clamp(static_cast<int>(std::ceil(side_px / (2 * size))), 4, 16);
+  const int fine = std::clamp(static_cast<int>(std::ceil((1 - 2 * border) * side_px / size)), 4, 16);
   const int count = size * fine;
   const SquareToQuad px_from_square(frame.corners_px);
   cv::Mat x(count, count, CV_32F), y(count, count, CV_32F);
   for (int row = 0; row < count; ++row)
     for (int column = 0; column < count; ++column) {
-      const auto inner = [&](int i) { return k_border + (1 - 2 * k_border) * (i + 0.5) / count; };
+      const auto inner = [&](int i) { return border + (1 - 2 * border) * (i + 0.5) / count; };
       const Eigen::Vector2d px = px_from_square.at(inner(column), inner(row));
       x.at<float>(row, column) = static_cast<float>(px.x());
       y.at<float>(row, column) = static_cast<float>(px.y());
@@ -133,24 +133,29 @@ double deviation(const TrainedTemplate& trained) {
 
 }  // namespace
 
-Result<TrainedTemplate> train_template(const cv::Mat& image) {
+Result<TrainedTemplate> train_template(const cv::Mat& image, double pattern_ratio) {
+  const double border = 0.5 * (1 - pattern_ratio);
   const cv::Mat grey = to_grey(image);
-  const std::vector<RefinedQuad> frames = frames_in(grey);
+  const std::vector<RefinedQuad> frames = frames_in(grey, border);
   if (frames.empty())
     return error(
-        "expected a black square frame on white, a quarter of its side wide all around, found none. "
-        "Photograph the marker upright, sharp, with white paper around it.");
+        "expected a black square frame on white, {:.3g} of its side wide all around, found none. Photograph "
+        "the "
+        "marker upright, sharp, with white paper around it. A frame of another width: limn markers --train "
+        "--pattern-ratio (the inside's width as share of the frame's).",
+        border);
   if (frames.size() > 1) return several(frames);
   const RefinedQuad frame = upright(frames.front());
   TrainedTemplate trained;
   trained.corners_px = frame.corners_px;
   trained.side_px = std::sqrt(area(frame.corners_px));
-  if (trained.side_px < k_min_side_px)
+  const double least_px = k_min_value_px * TrainedTemplate::k_size / pattern_ratio;
+  if (trained.side_px < least_px)
     return error(
         "the frame is {:.0f} px wide, expected at least {:.0f} (two pixels for each value). Photograph it "
         "from nearer.",
-        trained.side_px, k_min_side_px);
-  const cv::Mat values = rectified(image, frame, trained.side_px);
+        trained.side_px, least_px);
+  const cv::Mat values = rectified(image, frame, border, trained.side_px);
   const double black = mean(frame.inside_level);
   const double scale = 255 / (mean(frame.outside_level) - black);
   const int channels = values.channels();

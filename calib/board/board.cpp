@@ -3,6 +3,7 @@
 #include <charconv>
 #include <cmath>
 #include <numeric>
+#include <opencv2/core.hpp>
 
 #include "calib/board/board_dictionary.h"
 #include "core/predefined_family.h"
@@ -78,6 +79,21 @@ Status read_charuco_fields(const std::string& text, const std::vector<std::strin
 
 bool near_whole(double v) { return std::abs(v - std::round(v)) < 1e-6; }
 
+Status read_aprilgrid_fields(const std::string& text, const std::string& gap, Board* board) {
+  constexpr double k_least_gap = 0.05, k_most_gap = 1;
+  if (!read_number(gap, &board->gap_share) || !(board->gap_share >= k_least_gap) ||
+      !(board->gap_share <= k_most_gap))
+    return error("board '{}': expected the gap between tags as share of a tag's side, {} to {}, found '{}'.",
+                 text, k_least_gap, k_most_gap, gap);
+  const int tags = board->columns * board->rows;
+  board->columns = 2 * board->columns + 1;
+  board->rows = 2 * board->rows + 1;
+  board->dictionary = "apriltag_36h11";
+  if (const int has = dictionary_of(*board)->bytesList.rows; has < tags)
+    return error("board '{}': needs {} tags, but {} has {}.", text, tags, board->dictionary, has);
+  return {};
+}
+
 // Pixels of a square and of a marker's cell: whole cells, equal margins, and if possible a whole number of
 // pixels per metre, because a PNG's pHYs is a whole number.
 struct PixelGrid {
@@ -85,6 +101,13 @@ struct PixelGrid {
   int cell = 0;
 };
 PixelGrid pixel_grid(const Board& board, int least) {
+  if (board.kind == BoardKind::aprilgrid) {
+    const int cells = aprilgrid_tag_cells(board);
+    const int first = (least + cells - 1) / cells;
+    for (int cell = first; cell < 4 * first; ++cell)
+      if (near_whole(cell * cells * board.gap_share)) return {cell * cells, cell};
+    return {first * cells, first};  // the gaps are rounded to whole pixels
+  }
   if (board.kind == BoardKind::chessboard) {
     int square = least;
     while (square < 2 * least && !near_whole(square / board.square_m)) ++square;
@@ -112,6 +135,15 @@ PixelGrid pixel_grid(const Board& board, int least) {
 
 }  // namespace
 
+std::optional<int> aprilgrid_tag(const Board& board, int column, int row) {
+  if (board.kind != BoardKind::aprilgrid || column % 2 == 0 || row % 2 == 0) return std::nullopt;
+  return (board.rows / 2 - 1 - row / 2) * (board.columns / 2) + column / 2;
+}
+
+int aprilgrid_tag_cells(const Board& board) {
+  return dictionary_of(board)->markerSize + 2 * k_aprilgrid_border;
+}
+
 cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
   const PredefinedFamily* family = find_predefined_family(board.dictionary);
   LIMN_CHECK(family != nullptr);
@@ -119,25 +151,34 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
 }
 
 Result<Board> Board::parse(const std::string& text) {
-  constexpr auto k_forms = "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7 or chessboard:9x7:75mm";
+  constexpr auto k_forms =
+      "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7, chessboard:9x7:75mm or aprilgrid:6x6:88mm:0.3";
   const auto parts = split(text, ':');
   Board board;
-  const bool charuco = parts[0] == "charuco";
-  if (!charuco && parts[0] != "chessboard") return error("board '{}': expected {}.", text, k_forms);
-  if (parts.size() < 3 || parts.size() > (charuco ? 5U : 3U))
+  const bool charuco = parts[0] == "charuco", aprilgrid = parts[0] == "aprilgrid";
+  if (!charuco && !aprilgrid && parts[0] != "chessboard")
     return error("board '{}': expected {}.", text, k_forms);
-  board.kind = charuco ? BoardKind::charuco : BoardKind::chessboard;
-  const int least = charuco ? 3 : 2;
+  const std::size_t most_parts = charuco ? 5 : aprilgrid ? 4 : 3;
+  if (parts.size() < (aprilgrid ? 4 : 3) || parts.size() > most_parts)
+    return error("board '{}': expected {}.", text, k_forms);
+  board.kind = charuco ? BoardKind::charuco : aprilgrid ? BoardKind::aprilgrid : BoardKind::chessboard;
+  const int least = charuco ? 3 : aprilgrid ? 1 : 2;
   if (!read_size(parts[1], &board.columns, &board.rows) || board.columns < least || board.rows < least ||
       board.columns > 100 || board.rows > 100)
     return error("board '{}': expected {}, such as 11x8, found '{}'.", text,
-                 charuco ? "the number of squares (3 to 100)" : "the number of inner corners (2 to 100)",
+                 charuco     ? "the number of squares (3 to 100)"
+                 : aprilgrid ? "the number of tags (1 to 100)"
+                             : "the number of inner corners (2 to 100)",
                  parts[1]);
   if (!read_length(parts[2], &board.square_m))
     return error(
         "board '{}': expected the square's side with its unit (mm, cm or m), 0.1mm to 10m, such as 25mm, "
         "found '{}'.",
         text, parts[2]);
+  if (aprilgrid) {
+    LIMN_TRY_STATUS(read_aprilgrid_fields(text, parts[3], &board));
+    return board;
+  }
   if (!charuco) {
     ++board.columns;
     ++board.rows;
@@ -151,6 +192,8 @@ std::string Board::text() const {
   const double mm = square_m * 1e3;
   if (kind == BoardKind::chessboard)
     return fmt::format("chessboard:{}x{}:{:.10g}mm", columns - 1, rows - 1, mm);
+  if (kind == BoardKind::aprilgrid)
+    return fmt::format("aprilgrid:{}x{}:{:.10g}mm:{:.10g}", columns / 2, rows / 2, mm, gap_share);
   std::string base = fmt::format("charuco:{}x{}:{:.10g}mm", columns, rows, mm);
   const bool plain_share = marker_share == 0.75;
   if (!plain_share || dictionary != default_dictionary(marker_count(*this))) base += ":" + dictionary;
@@ -160,8 +203,21 @@ std::string Board::text() const {
 
 Eigen::Vector3d Board::p_corner(int id) const {
   const int column = id % (columns - 1), row = id / (columns - 1);
-  return {(column + 1) * square_m, (row + 1) * square_m, 0};
+  return {p_line(column + 1), p_line(row + 1), 0};
 }
+
+namespace {
+
+// Draws an AprilGrid's tag into its black square. OpenCV's table is turned by 180 degrees against AprilTag's.
+void draw_tag(const Board& board, int id, int cell_px, cv::Mat square) {
+  cv::Mat tag;
+  dictionary_of(board)->drawMarker(id, (dictionary_of(board)->markerSize + 2) * cell_px, tag);
+  cv::rotate(tag, tag, cv::ROTATE_180);
+  const int border = (square.cols - tag.cols) / 2;
+  tag.copyTo(square(cv::Rect(border, border, tag.cols, tag.rows)));
+}
+
+}  // namespace
 
 BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   const PixelGrid grid = pixel_grid(board, std::max(options.square_px, 8));
@@ -169,17 +225,20 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   BoardSheet sheet;
   sheet.pixels_per_metre = grid.square / board.square_m;
   sheet.px_board_origin = Eigen::Vector2d::Constant(margin - 0.5);
-  sheet.image = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + board.columns * grid.square,
-                        CV_8U, cv::Scalar(255));
+  const auto px = [&](int line) {
+    return static_cast<int>(std::lround(sheet.pixels_per_metre * board.p_line(line)));
+  };
+  sheet.image = cv::Mat(2 * margin + px(board.rows), 2 * margin + px(board.columns), CV_8U, cv::Scalar(255));
   cv::Ptr<cv::aruco::Dictionary> dictionary;
   if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
   int id = 0;
   for (int row = 0; row < board.rows; ++row) {
     for (int column = 0; column < board.columns; ++column) {
-      cv::Mat square = sheet.image(
-          cv::Rect(margin + column * grid.square, margin + row * grid.square, grid.square, grid.square));
+      cv::Mat square = sheet.image(cv::Rect(margin + px(column), margin + px(row),
+                                            px(column + 1) - px(column), px(row + 1) - px(row)));
       if (board.is_black(column, row)) {
         square.setTo(0);
+        if (const auto tag = aprilgrid_tag(board, column, row)) draw_tag(board, *tag, grid.cell, square);
       } else if (dictionary) {
         const int side = grid.cell * (dictionary->markerSize + 2), gap = (grid.square - side) / 2;
         cv::Mat marker;

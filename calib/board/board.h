@@ -9,23 +9,28 @@
 
 namespace limn::calib {
 
-enum class BoardKind { charuco, chessboard };
+enum class BoardKind { charuco, chessboard, aprilgrid };
 
 /// A flat calibration target. Board frame: origin at the outer corner of the top-left square (the grid's
 /// corner, not the sheet's), x right, y down, z into the sheet; metres. The top-left square is black; on a
-/// ChArUco board every white square carries a marker, ids counted row by row from 0.
+/// ChArUco board every white square carries a marker, ids counted row by row from 0. Kalibr's AprilGrid is
+/// such a grid, too: its columns and rows are by turns narrow and wide, its wide black squares are tags of
+/// apriltag_36h11 in borders of two cells, its narrow ones the squares that touch their corners. Tag 0 is the
+/// one at the bottom left, and ids go to the right, then up; tags stand as AprilTag's own library draws them.
 ///
 /// Text form, as in docs/formats.md:
 ///   `charuco:11x8:25mm`                        11 x 8 squares of 25 mm
 ///   `charuco:11x8:25mm:aruco_5x5_100:0.7`      with its dictionary and the marker's side as a share of the
 ///                                              square's
 ///   `chessboard:9x7:75mm`                      9 x 7 INNER corners, that is 10 x 8 squares
+///   `aprilgrid:6x6:88mm:0.3`                   6 x 6 tags of 88 mm, 0.3 x 88 mm apart (Kalibr's tagSpacing)
 /// Defaults: the smallest aruco_4x4 dictionary that has enough markers; 0.75 (whole cells: 8 to a square).
 struct Board {
   BoardKind kind = BoardKind::charuco;
-  int columns = 0;  ///< squares across (both kinds)
-  int rows = 0;     ///< squares down (both kinds)
-  double square_m = 0;
+  int columns = 0;          ///< squares across (both kinds)
+  int rows = 0;             ///< squares down (both kinds)
+  double square_m = 0;      ///< AprilGrid: the side of a tag
+  double gap_share = 0;     ///< AprilGrid: the narrow squares' side / the tags'
   std::string dictionary;   ///< ChArUco: OpenCV's predefined dictionary, `aruco_4x4_50`
   double marker_share = 0;  ///< ChArUco: the marker's side / the square's side
 
@@ -36,8 +41,14 @@ struct Board {
   int corner_count() const { return (columns - 1) * (rows - 1); }
   /// Position of a corner on the flat board (z = 0).
   Eigen::Vector3d p_corner(int id) const;
-  double width_m() const { return columns * square_m; }
-  double height_m() const { return rows * square_m; }
+  /// Distance of a line of the grid from the board's first one, across or down; line i lies between squares
+  /// i - 1 and i.
+  double p_line(int line) const {
+    if (kind != BoardKind::aprilgrid) return line * square_m;
+    return (line / 2 * (1 + gap_share) + line % 2 * gap_share) * square_m;
+  }
+  double width_m() const { return p_line(columns); }
+  double height_m() const { return p_line(rows); }
   bool is_black(int column, int row) const { return (column + row) % 2 == 0; }
 };
 

@@ -1,13 +1,23 @@
 #pragma once
 
 #include <opencv2/aruco/dictionary.hpp>
+#include <optional>
 
 #include "calib/board/board.h"
 
 namespace limn::calib {
 
-/// OpenCV's table of a ChArUco board's markers. For use in this folder only, because it needs OpenCV's
+/// OpenCV's table of a board's markers. For use in this folder only, because it needs OpenCV's
 /// headers.
 cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board);
+
+/// Width of the border of an AprilGrid's tags, in cells.
+constexpr int k_aprilgrid_border = 2;
+
+/// Cells along a side of an AprilGrid's tag, its border included.
+int aprilgrid_tag_cells(const Board& board);
+
+/// The id of the tag in a square; nullopt where there is none.
+std::optional<int> aprilgrid_tag(const Board& board, int column, int row);
 
 }  // namespace limn::calib

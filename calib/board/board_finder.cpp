@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
 #include "calib/board/board_dictionary.h"
@@ -270,11 +272,16 @@ std::vector<Expected> find_chessboard(const Board& board, const cv::Mat& grey) {
   return expected;
 }
 
-// A detected marker: its square and its corners, in units of squares and in pixels.
+// A detected marker: its square and its corners, on the board (as Board::p_line, in units of square_m) and in
+// pixels.
 struct DetectedMarker {
   int column = 0, row = 0;
   std::vector<cv::Point2f> in_squares, px;
 };
+
+float line_of(const Board& board, int line) {
+  return static_cast<float>(board.p_line(line) / board.square_m);
+}
 
 std::vector<DetectedMarker> find_markers(const Board& board, const cv::Mat& grey) {
   std::vector<std::vector<cv::Point2f>> quads;
@@ -319,6 +326,57 @@ std::vector<DetectedMarker> consistent(std::vector<DetectedMarker> markers) {
   return kept;
 }
 
+// The corners of an AprilGrid's tags in pixels, by their ids, detected in images whose white is widened so
+// much that tags do not touch the squares at their corners.
+std::map<int, std::vector<cv::Point2f>> find_tags(const Board& board, const cv::Mat& grey) {
+  const auto parameters = cv::aruco::DetectorParameters::create();
+  parameters->markerBorderBits = k_aprilgrid_border;
+  std::map<int, std::vector<cv::Point2f>> found;
+  for (const int widened_px : {1, 3, 5, 9}) {
+    cv::Mat apart;
+    cv::dilate(grey, apart, cv::Mat::ones(widened_px, widened_px, CV_8U));
+    std::vector<std::vector<cv::Point2f>> quads;
+    std::vector<int> ids;
+    cv::aruco::detectMarkers(apart, dictionary_of(board), quads, ids, parameters);
+    for (size_t i = 0; i < ids.size(); ++i) found.emplace(ids[i], quads[i]);
+  }
+  return found;
+}
+
+// The tags on the board. Kalibr prints tag 0 at the bottom left and tags as AprilTag's library draws them,
+// which is OpenCV's picture turned by 180 degrees; other programs begin at the top or use OpenCV's picture.
+std::vector<DetectedMarker> placed_tags(const Board& board,
+                                        const std::map<int, std::vector<cv::Point2f>>& tags,
+                                        bool is_zero_at_top,
+                                        bool is_turned) {
+  std::vector<DetectedMarker> markers;
+  for (int row = 0; row < board.rows; ++row)
+    for (int column = 0; column < board.columns; ++column) {
+      const auto id = aprilgrid_tag(board, column, is_zero_at_top ? board.rows - 1 - row : row);
+      if (!id || !tags.contains(*id)) continue;
+      const float left = line_of(board, column), right = line_of(board, column + 1);
+      const float top = line_of(board, row), bottom = line_of(board, row + 1);
+      DetectedMarker marker{
+          column, row, {{left, top}, {right, top}, {right, bottom}, {left, bottom}}, tags.at(*id)};
+      if (is_turned)
+        std::rotate(marker.in_squares.begin(), marker.in_squares.begin() + 2, marker.in_squares.end());
+      markers.push_back(std::move(marker));
+    }
+  return markers;
+}
+
+// The tags in the order and orientation that explain most of them.
+std::vector<DetectedMarker> consistent_tags(const Board& board, const cv::Mat& grey) {
+  const auto tags = find_tags(board, grey);
+  std::vector<DetectedMarker> most;
+  for (const bool is_zero_at_top : {false, true})
+    for (const bool is_turned : {true, false}) {
+      auto markers = consistent(placed_tags(board, tags, is_zero_at_top, is_turned));
+      if (markers.size() > most.size()) most = std::move(markers);
+    }
+  return most;
+}
+
 // The corner's position by a homography of the nearest markers; nullopt without a marker in a square beside
 // it.
 std::optional<Expected> expected_beside(const Board& board,
@@ -339,17 +397,22 @@ std::optional<Expected> expected_beside(const Board& board,
   if (!beside) return std::nullopt;
   const cv::Mat h = cv::findHomography(in_squares, px, 0);
   if (h.empty()) return std::nullopt;
-  const auto x = static_cast<float>(column + 1), y = static_cast<float>(row + 1);
+  const float x = line_of(board, column + 1), y = line_of(board, row + 1);
+  // The narrower of the squares beside the corner counts.
+  const float half = board.kind == BoardKind::aprilgrid ? 0.5F * static_cast<float>(board.gap_share) : 0.5F;
   const std::vector<cv::Point2f> places = {
-      {x, y}, {x + 0.5F, y}, {x - 0.5F, y}, {x, y + 0.5F}, {x, y - 0.5F}};
+      {x, y}, {x + half, y}, {x - half, y}, {x, y + half}, {x, y - half}};
   std::vector<cv::Point2f> found;
   cv::perspectiveTransform(places, found, h);
   return Expected{id, to_vector(found[0]), to_vector(found[1] - found[2]), to_vector(found[3] - found[4]),
                   board.is_black(column, row)};
 }
 
-std::vector<Expected> find_charuco(const Board& board, const cv::Mat& grey) {
-  const std::vector<DetectedMarker> markers = consistent(find_markers(board, grey));
+// The corners of a board with markers: ChArUco or AprilGrid.
+std::vector<Expected> find_by_markers(const Board& board, const cv::Mat& grey) {
+  const std::vector<DetectedMarker> markers = board.kind == BoardKind::aprilgrid
+                                                  ? consistent_tags(board, grey)
+                                                  : consistent(find_markers(board, grey));
   std::vector<Expected> expected;
   for (int id = 0; id < board.corner_count() && !markers.empty(); ++id) {
     if (auto at = expected_beside(board, markers, id)) expected.push_back(*at);
@@ -364,7 +427,7 @@ std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey) {
   constexpr size_t k_least = 4;  // fewer do not determine a pose
   std::vector<BoardCorner> corners;
   for (const Expected& at :
-       board.kind == BoardKind::charuco ? find_charuco(board, grey) : find_chessboard(board, grey)) {
+       board.kind == BoardKind::chessboard ? find_chessboard(board, grey) : find_by_markers(board, grey)) {
     if (auto corner = refined(board, grey, at)) corners.push_back(*corner);
   }
   if (corners.size() < k_least) corners.clear();

@@ -19,12 +19,12 @@ struct BoardCorner {
 constexpr double k_corner_floor_px = 0.005;
 
 /// Finds the board's corners in an 8-bit grey image, sorted by id; empty when the board is not visible.
-/// ChArUco boards may be partly visible, chessboards must be completely visible. OpenCV's detectors find the
-/// corners, then each corner is refined by fitting two blurred edges that cross (least squares over the
-/// pixels along both edges, up to 0.42 squares away, clear of the markers). So nothing depends on OpenCV's
-/// interpolation, which in 4.6 shifts ChArUco corners by half a pixel. A chessboard with an even number of
-/// squares both ways looks the same when turned by 180 degrees: its first corner is the one nearer to the
-/// image's top left.
+/// ChArUco boards and AprilGrids may be partly visible, chessboards must be completely visible. OpenCV's
+/// detectors find the corners, then each corner is refined by fitting two blurred edges that cross (least
+/// squares over the pixels along both edges, up to 0.42 squares away, clear of the markers). So nothing
+/// depends on OpenCV's interpolation, which in 4.6 shifts ChArUco corners by half a pixel. A chessboard with
+/// an even number of squares both ways looks the same when turned by 180 degrees: its first corner is the one
+/// nearer to the image's top left.
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey);
 
 }  // namespace limn::calib

@@ -118,15 +118,17 @@ struct Grid {
   int columns, rows;
 };
 
-Result<Grid> grid_for(double size_mm) {
+// `square_share`: the marker's square / the whole marker.
+Result<Grid> grid_for(double size_mm, double square_share) {
   Grid grid{};
   grid.margin = margin_mm(size_mm);
-  grid.pitch_x = size_mm + 2 * grid.margin;
+  grid.pitch_x = size_mm / square_share + 2 * grid.margin;
   grid.pitch_y = grid.pitch_x + k_label;
   grid.columns = static_cast<int>((k_page_width - 2 * k_edge) / grid.pitch_x);
   grid.rows = static_cast<int>((k_page_height - 2 * k_edge - k_foot) / grid.pitch_y);
   if (grid.columns < 1 || grid.rows < 1)
-    return error("--size-mm: expected at most 152 mm, the largest marker on A4, found {}.", size_mm);
+    return error("--size-mm: expected at most {:.0f} mm, the largest marker on A4, found {}.",
+                 std::floor((k_page_width - 2 * k_edge) / (1 / square_share + 0.25)), size_mm);
   return grid;
 }
 
@@ -177,24 +179,25 @@ Result<std::vector<std::string>> parse_ids(const std::string& text) {
 
 struct Drawing {
   std::string label;
-  cv::Mat cells;
+  MarkerDrawing marker;
 };
 
 Result<std::vector<Drawing>> drawings_of(const MarkerSheetOptions& options) {
-  constexpr const char* k_template = "artoolkit:";
   std::vector<MarkerName> names;
-  if (options.family.rfind(k_template, 0) == 0) {
-    names.push_back({"artoolkit", options.family.substr(std::string(k_template).size())});
+  if (options.family.starts_with("artoolkit:") || options.family.starts_with("artoolkit_inverted:")) {
+    const std::size_t colon = options.family.find(':');
+    names.push_back({options.family.substr(0, colon), options.family.substr(colon + 1)});
   } else {
     LIMN_TRY(const std::vector<std::string> ids, parse_ids(options.ids));
     for (const std::string& id : ids) names.push_back({options.family, id});
   }
   std::vector<Drawing> drawings;
   for (const MarkerName& name : names) {
-    auto cells = tracker::draw_marker(name, 1);
-    if (!cells) return usage_error("limn markers: {}", cells.message());
-    const std::string label = fmt::format("{}   {:g} mm", name.text(), options.size_mm);
-    drawings.push_back({label, std::move(*cells)});
+    auto marker = tracker::draw_whole_marker(name, 1);
+    if (!marker) return usage_error("limn markers: {}", marker.message());
+    const std::string square = marker->around_px > 0 ? " (the white square)" : "";
+    const std::string label = fmt::format("{}   {:g} mm{}", name.text(), options.size_mm, square);
+    drawings.push_back({label, std::move(*marker)});
   }
   return drawings;
 }
@@ -206,15 +209,21 @@ std::filesystem::path page_path(const std::filesystem::path& out, int page) {
 
 }  // namespace
 
-// An eighth of the side, which is at least one cell for every family.
+// An eighth of the side, which is at least one cell for every family with white paper next to its square.
 double margin_mm(double size_mm) { return std::max(3.0, size_mm / 8); }
+
+Result<double> around_mm(const MarkerSheetOptions& options) {
+  LIMN_TRY(const std::vector<Drawing> drawings, drawings_of(options));
+  return 0.5 * options.size_mm * (1 / drawings.front().marker.square_share() - 1);
+}
 
 Result<MarkerSheet> write_marker_sheet(const MarkerSheetOptions& options) {
   const bool svg = options.out.extension() == ".svg";
   if (!std::isfinite(options.size_mm) || options.size_mm < 3)
     return usage_error("--size-mm: expected at least 3, found {}.", options.size_mm);
   LIMN_TRY(const std::vector<Drawing> drawings, drawings_of(options));
-  const auto fitted = grid_for(options.size_mm);
+  const double square_share = drawings.front().marker.square_share();
+  const auto fitted = grid_for(options.size_mm, square_share);
   if (!fitted) return usage_error("{}", fitted.message());
   const Grid& grid = *fitted;
   const int per_page = grid.columns * grid.rows;
@@ -226,9 +235,10 @@ Result<MarkerSheet> write_marker_sheet(const MarkerSheetOptions& options) {
     for (int i = page * per_page; i < std::min(count, (page + 1) * per_page); ++i) {
       const int place = i - page * per_page;
       const Drawing& drawing = drawings[static_cast<std::size_t>(i)];
-      draw_marker_cell(sheet->cairo.get(), drawing.cells, drawing.label,
+      draw_marker_cell(sheet->cairo.get(), drawing.marker.image, drawing.label,
                        k_edge + place % grid.columns * grid.pitch_x,
-                       k_edge + place / grid.columns * grid.pitch_y, options.size_mm, grid.margin);
+                       k_edge + place / grid.columns * grid.pitch_y, options.size_mm / square_share,
+                       grid.margin);
     }
     if (page + 1 == pages) break;
     if (svg) {

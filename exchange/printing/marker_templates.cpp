@@ -72,15 +72,23 @@ std::string similarities_json(const std::vector<TemplateSimilarity>& pairs) {
 
 }  // namespace
 
-Status train_template(const std::filesystem::path& image, const std::filesystem::path& out) {
+Status train_template(const std::filesystem::path& image,
+                      double pattern_ratio,
+                      const std::filesystem::path& out) {
+  if (!tracker::is_pattern_ratio(pattern_ratio))
+    return usage_error("--pattern-ratio: expected {} to {}, found {}.", tracker::k_least_pattern_ratio,
+                       tracker::k_most_pattern_ratio, pattern_ratio);
   if (out.extension() != ".patt")
     return usage_error("--out: expected a file that ends in .patt for a template, found '{}'.", out.string());
   LIMN_TRY(const cv::Mat pixels, read_image(image));
-  const auto trained = tracker::train_template(pixels);
+  const auto trained = tracker::train_template(pixels, pattern_ratio);
   if (!trained) return error("{}: {}", image.string(), trained.message());
   LIMN_TRY_STATUS(write_file(out, tracker::template_text(*trained)));
   print_out("{}: the frame at ({:.0f}, {:.0f}), {:.0f} px wide\n", out.string(), trained->corners_px[0].x(),
             trained->corners_px[0].y(), trained->side_px);
+  constexpr double k_usual_ratio = 0.5;
+  if (pattern_ratio != k_usual_ratio)
+    print_out("Name it with its pattern ratio: artoolkit:{}@{:g}\n", out.string(), pattern_ratio);
   return {};
 }
 

@@ -103,7 +103,7 @@ struct BoardAndProjector {
   calib::BoardSheet bar() const {
     calib::BoardSheet made{cv::Mat(160, 420, CV_8U, cv::Scalar(255)), 1000, {49.5, -40.5}};
     for (const int id : {3, 7}) {
-      const cv::Mat marker = tracker::marker_image({"apriltag_36h11", std::to_string(id)}).value();
+      const cv::Mat marker = tracker::marker_image({"apriltag_36h11", std::to_string(id)}).value().image;
       cv::Mat grey;
       cv::resize(to_grey(marker), grey, {64, 64}, 0, 0, cv::INTER_NEAREST);
       grey.copyTo(made.image(cv::Rect(id == 3 ? 53 : 303, 48, 64, 64)));

@@ -107,6 +107,23 @@ TEST(Board, ReadsItsTextFormsAndWritesThemBack) {
   EXPECT_EQ(Board::parse("charuco:14x10:20mm")->dictionary, "aruco_4x4_100");
 }
 
+// Kalibr's targets: aprilgrid_6x6.yaml has tagSize 0.088, tagSpacing 0.3.
+TEST(Board, KnowsKalibrsAprilGrid) {
+  const auto grid = Board::parse("aprilgrid:6x5:88mm:0.3");
+  ASSERT_TRUE(grid.ok()) << grid.message();
+  EXPECT_EQ(grid->text(), "aprilgrid:6x5:88mm:0.3");
+  EXPECT_EQ(grid->corner_count(), 12 * 10);
+  const double gap = 0.3 * 0.088;
+  EXPECT_NEAR((grid->p_corner(0) - Eigen::Vector3d(gap, gap, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((grid->p_corner(1) - Eigen::Vector3d(gap + 0.088, gap, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR((grid->p_corner(2) - Eigen::Vector3d(2 * gap + 0.088, gap, 0)).norm(), 0, 1e-12);
+  EXPECT_NEAR(grid->width_m(), 6 * 0.088 + 7 * gap, 1e-12);
+  for (const char* text :
+       {"aprilgrid:6x6:88mm", "aprilgrid:6x6:88mm:0", "aprilgrid:6x6:88mm:2", "aprilgrid:0x6:88mm:0.3",
+        "aprilgrid:30x30:88mm:0.3", "aprilgrid:6x6:88mm:0.3:x", "aprilgrid:6x6:88:0.3"})
+    EXPECT_FALSE(Board::parse(text).ok()) << text;
+}
+
 TEST(Board, SaysWhatIsWrongWithItsText) {
   for (const char* text :
        {"", "charuco", "charuco:11x8", "charuco:11x8:25", "charuco:11x8:-25mm", "charuco:11:25mm",
@@ -120,8 +137,8 @@ TEST(Board, SaysWhatIsWrongWithItsText) {
 }
 
 TEST(Board, DrawsItsGridOnWholePixels) {
-  for (const char* text :
-       {"charuco:11x8:25mm", "charuco:7x5:40mm:aruco_6x6_250:0.6", "chessboard:9x7:75mm"}) {
+  for (const char* text : {"charuco:11x8:25mm", "charuco:7x5:40mm:aruco_6x6_250:0.6", "chessboard:9x7:75mm",
+                           "aprilgrid:6x5:88mm:0.3"}) {
     const Board board = Board::parse(text).value();
     const BoardSheet sheet = draw_board(board, {.square_px = 50});
     const double square = sheet.pixels_per_metre * board.square_m;
@@ -205,6 +222,46 @@ TEST(BoardFinder, TellsTheTruthAboutItsNoise) {
   ASSERT_GT(count, 300);
   EXPECT_NEAR(std::sqrt(squared_pull / count), 1.0, 0.2);
   EXPECT_LT(std::sqrt(squared_error / count), 0.04);
+}
+
+TEST(BoardFinder, FindsAprilGridCornersWithoutBiasWhicheverWayItIsTurned) {
+  const Board board = Board::parse("aprilgrid:6x5:88mm:0.3").value();
+  const BoardSheet sheet = draw_board(board, {.square_px = 160});
+  for (const double angle : {0.2, 2.0, 3.3, 4.9}) {
+    const Matrix3d view = tilted_view(sheet, 560, angle, {401.3, 297.8}, 0.15);
+    const auto found = find_board(board, photograph(sheet.image, view, {800, 600}, 0.7));
+    const Errors errors = errors_of(board, sheet, view, found);
+    EXPECT_GE(errors.count, board.corner_count() - 4) << "angle " << angle;
+    EXPECT_LT(errors.mean.norm(), 0.02) << "angle " << angle;
+    EXPECT_LT(errors.worst, 0.15) << "angle " << angle;
+  }
+}
+
+TEST(BoardFinder, FindsAnAprilGridThatBeginsAtTheTopWithOpencvsTags) {
+  const Board board = Board::parse("aprilgrid:3x2:40mm:0.25").value();
+  BoardSheet sheet = draw_board(board, {.square_px = 160});
+  const Matrix3d view = tilted_view(sheet, 500, 0.2, {321.3, 237.8}, 0.1);
+  const auto kalibrs = find_board(board, photograph(sheet.image, view, {640, 480}, 0.7));
+  // Turning every row of tags by 180 degrees, and exchanging the two rows, makes the other layout.
+  const cv::Mat from = sheet.image.clone();
+  const auto square = [&](const cv::Mat& image, int column, int row) {
+    const auto px = [&](int line) {
+      return static_cast<int>(
+          std::lround(sheet.px_board_origin.x() + 0.5 + sheet.pixels_per_metre * board.p_line(line)));
+    };
+    return image(cv::Rect(px(2 * column + 1), px(2 * row + 1), px(2) - px(1), px(2) - px(1)));
+  };
+  for (int row = 0; row < 2; ++row)
+    for (int column = 0; column < 3; ++column) {
+      cv::Mat tag;
+      cv::rotate(square(from, column, 1 - row), tag, cv::ROTATE_180);
+      tag.copyTo(square(sheet.image, column, row));
+    }
+  const auto found = find_board(board, photograph(sheet.image, view, {640, 480}, 0.7));
+  const Errors errors = errors_of(board, sheet, view, found);
+  EXPECT_EQ(kalibrs.size(), 24u);
+  EXPECT_EQ(errors.count, 24);
+  EXPECT_LT(errors.worst, 0.15);
 }
 
 TEST(BoardFinder, FindsNothingWhereThereIsNoBoard) {

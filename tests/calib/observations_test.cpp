@@ -4,6 +4,7 @@
 
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <string>
 
 #include "tests/support/matchers.h"
 
@@ -12,15 +13,15 @@ namespace {
 
 using Eigen::Vector2d;
 
-// A ChArUco sheet seen head on. The label of each paper pixel is half its position; ink has no label, and
+// A sheet seen head on. The label of each paper pixel is half its position; ink has no label, and
 // paper beside ink a wrong one, as blur would give it.
 struct Sheet {
-  Board board = Board::parse("charuco:11x8:25mm").value();
+  Board board;
   BoardSheet drawn = draw_board(board, {.square_px = 40});
   Decoded decoded;
   std::vector<BoardCorner> corners;
 
-  Sheet() {
+  explicit Sheet(const std::string& text = "charuco:11x8:25mm") : board(Board::parse(text).value()) {
     const cv::Mat& image = drawn.image;
     cv::Mat least;
     cv::erode(image, least, cv::Mat());
@@ -46,6 +47,14 @@ TEST(Observations, PaperAroundAMarkerMakesMatches) {
   const std::vector<Match> matches = matches_on_board(sheet.board, sheet.corners, sheet.decoded);
   // 44 white squares of four cells, each with a marker over more than half of it.
   EXPECT_GE(matches.size(), 170U);
+}
+
+// The 71 white rectangles between tags and squares have four cells each.
+TEST(Observations, PaperBetweenTheTagsOfAnAprilGridMakesMatches) {
+  const Sheet sheet("aprilgrid:6x5:88mm:0.3");
+  const std::vector<Match> matches = matches_on_board(sheet.board, sheet.corners, sheet.decoded);
+  EXPECT_GE(matches.size(), 250U);
+  for (const Match& match : matches) ASSERT_TRUE(test::near(match.px_projector, 0.5 * match.px_camera, 1e-3));
 }
 
 TEST(Observations, PaperBesideInkIsLeftOut) {

@@ -55,6 +55,26 @@ TEST(Markers, PrintedBarcodesAreFound) {
   expect_printed("artoolkit_3x3", "0-5,63", {"0", "1", "2", "3", "4", "5", "63"});
 }
 
+TEST(Markers, PrintedAprilTag3MarkersAreFound) {
+  expect_printed("apriltag_41h12", "0-2,2114", {"0", "1", "2", "2114"});
+  expect_printed("apriltag_21h7", "0,37", {"0", "37"});
+}
+
+TEST(Markers, PrintedInvertedAndMipMarkersAreFound) {
+  expect_printed("aruco_4x4_50_inverted", "0-3", {"0", "1", "2", "3"});
+  expect_printed("aruco_mip_36h12", "0,249", {"0", "249"});
+}
+
+TEST(Markers, AHolderForCellsAroundTheSquareIsRefused) {
+  apps::MarkersOptions options;
+  options.family = "apriltag_41h12";
+  options.mount = test::test_folder() / "holder.stl";
+  const Status status = apps::run_markers(options);
+  ASSERT_FALSE(status);
+  EXPECT_TRUE(status.error().wrong_usage);
+  EXPECT_NE(status.message().find("--mount"), std::string::npos);
+}
+
 TEST(Markers, DrawSvgPages) {
   apps::MarkersOptions options;
   options.ids = "0-30";
@@ -66,12 +86,13 @@ TEST(Markers, DrawSvgPages) {
 
 TEST(Markers, DrawABoardWithItsScale) {
   apps::MarkersOptions options;
-  options.board = "chessboard:9x7:20mm";
-  for (const char* name : {"board.pdf", "board.png", "board.svg"}) {
-    options.out = test::test_folder() / name;
-    const Status status = apps::run_markers(options);
-    EXPECT_TRUE(status) << status.message();
-  }
+  for (const char* board : {"chessboard:9x7:20mm", "aprilgrid:6x6:88mm:0.3"})
+    for (const char* name : {"board.pdf", "board.png", "board.svg"}) {
+      options.board = board;
+      options.out = test::test_folder() / name;
+      const Status status = apps::run_markers(options);
+      EXPECT_TRUE(status) << status.message();
+    }
 }
 
 TEST(Markers, TellWrongUsage) {

@@ -95,6 +95,7 @@ const std::map<std::string, Names>& guests() {
       {"opencv2/calib3d", {"calib"}},
       {"opencv2/aruco", {"core", "calib", "tracker"}},
       {"opencv2/videoio", {"device"}},
+      {"apriltag/", {"tracker"}},
   };
   return homes;
 }

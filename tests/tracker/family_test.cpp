@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,78 @@ TEST(Families, SaysWhatIsWrongWithADictionaryFile) {
   EXPECT_NE(message("%YAML:1.0\nnmarkers: [").find("broken.yml"), std::string::npos);
   EXPECT_NE(message("").find("broken.yml"), std::string::npos);
   EXPECT_EQ(message("%YAML:1.0\nnmarkers: 1\nmarkersize: 3\nmarker_0: \"010110100\"\n"), "loaded");
+}
+
+TEST(Families, TellWhichMarkersOfADictionaryLookTheSame) {
+  const auto file = test::test_folder() / "alike.yml";
+  const auto message = [&](const std::string& a, const std::string& b) {
+    EXPECT_TRUE(write_file(
+        file, "%YAML:1.0\nnmarkers: 2\nmarkersize: 3\nmarker_0: \"" + a + "\"\nmarker_1: \"" + b + "\"\n"));
+    return load_message("aruco:" + file.string());
+  };
+  EXPECT_NE(message("110100000", "110100000").find("marker_0 and marker_1 look the same"), std::string::npos);
+  EXPECT_NE(message("110100000", "011001000").find("marker_0 and marker_1 turned by 270 degrees"),
+            std::string::npos);
+  EXPECT_NE(message("110100000", "101111101").find("marker_1 looks the same turned by 180 degrees"),
+            std::string::npos);
+  EXPECT_NE(message("010111010", "110100000").find("marker_0 looks the same turned by 90 degrees"),
+            std::string::npos);
+  EXPECT_EQ(message("110100000", "110100001"), "loaded");  // with a warning: one wrong cell exchanges them
+}
+
+TEST(Families, CorrectNoErrorsWhereOneMakesAnotherMarker) {
+  const auto file = test::test_folder() / "near.yml";
+  const std::string code(35, '0');
+  ASSERT_TRUE(write_file(file, "%YAML:1.0\nnmarkers: 2\nmarkersize: 6\nmarker_0: \"1" + code +
+                                   "\"\nmarker_1: \"11" + code.substr(1) + "\"\n"));
+  const auto loaded = Families::load(std::vector{"aruco:" + file.string()});
+  ASSERT_TRUE(loaded) << loaded.message();
+  EXPECT_EQ(loaded->codes()[0].max_errors[0], 0);
+}
+
+TEST(Families, RefuseATemplateThatEndsAfterWholeRows) {
+  const auto file = test::test_folder() / "short.patt";
+  std::string text = template_text(16);  // 192 lines of 16 numbers
+  std::size_t end = 0;
+  for (int line = 0; line < 147; ++line) end = text.find('\n', end) + 1;  // 2352 numbers, as 14 x 14 x 12
+  ASSERT_TRUE(write_file(file, text.substr(0, end)));
+  const std::string message = load_message("artoolkit:" + file.string());
+  EXPECT_NE(message.find("line 147: expected 3072 numbers"), std::string::npos) << message;
+  EXPECT_NE(message.find("found 2352"), std::string::npos) << message;
+}
+
+TEST(Families, TakeAPatternRatioAfterTheFilesName) {
+  const auto file = test::test_folder() / "wide@home.patt";
+  ASSERT_TRUE(write_file(file, template_text(16)));
+  const auto loaded = Families::load(std::vector{"artoolkit:" + file.string() + "@0.8"});
+  ASSERT_TRUE(loaded) << loaded.message();
+  EXPECT_EQ(loaded->templates()[0].id, "wide@home.patt@0.8");
+  EXPECT_NEAR(loaded->templates()[0].border, 0.1, 1e-12);
+  EXPECT_EQ(load_message("artoolkit:" + file.string()), "loaded");
+  for (const char* ratio : {"@1", "@0.1", "@.", "@0.8.1"})
+    EXPECT_NE(load_message("artoolkit:" + file.string() + ratio).find("expected the pattern's share"),
+              std::string::npos)
+        << ratio;
+}
+
+TEST(Families, NameInvertedMarkersByAWord) {
+  const auto families =
+      Families::load(std::vector<std::string>{"aruco_4x4_50_inverted", "aruco_4x4_50", "apriltag_41h12"});
+  ASSERT_TRUE(families) << families.message();
+  EXPECT_EQ(families->codes()[0].name, "aruco_4x4_50_inverted");
+  EXPECT_TRUE(families->codes()[0].light_on_dark);
+  EXPECT_EQ(families->codes()[0].codes, families->codes()[1].codes);
+  EXPECT_TRUE(families->codes()[2].light_on_dark);
+  EXPECT_NE(load_message("_inverted").find("expected one of"), std::string::npos);
+}
+
+TEST(Families, DrawInvertedMarkersInADarkRing) {
+  const cv::Mat dark = draw_marker({"aruco_4x4_50", "7"}, 3).value();
+  const MarkerDrawing light = draw_whole_marker({"aruco_4x4_50_inverted", "7"}, 3).value();
+  EXPECT_EQ(light.around_px, 3);
+  const cv::Mat square = draw_marker({"aruco_4x4_50_inverted", "7"}, 3).value();
+  EXPECT_EQ(cv::countNonZero(square == dark), 0);
+  EXPECT_EQ(cv::countNonZero(light.image), cv::countNonZero(square));
 }
 
 TEST(Families, DrawsOnlyIdsThatExist) {

@@ -69,17 +69,24 @@ std::optional<double> ink(const cv::Mat& cells, int column, int row) {
   return cells.at<std::uint8_t>(row, column) / 255.0;
 }
 
-cv::Mat cells_of(const MarkerName& marker) {
-  static std::map<std::string, cv::Mat> known;
-  cv::Mat& cells = known[marker.text()];
-  if (cells.empty()) cells = tracker::draw_marker(marker, 1).value();
-  return cells;
+MarkerDrawing drawing_of(const PlacedMarker& placed) {
+  if (!placed.cells.empty()) return {placed.cells, 0};
+  static std::map<std::string, MarkerDrawing> known;
+  MarkerDrawing& drawing = known[placed.marker.text()];
+  if (drawing.image.empty()) drawing = tracker::draw_whole_marker(placed.marker, 1).value();
+  return drawing;
+}
+
+// The same with the size of everything that is printed instead of the square's.
+PlacedMarker whole(PlacedMarker placed) {
+  placed.size_m /= drawing_of(placed).square_share();
+  return placed;
 }
 
 cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& size) {
   Eigen::Vector2d low(1e9, 1e9);
   Eigen::Vector2d high(-1e9, -1e9);
-  PlacedMarker paper = placed;
+  PlacedMarker paper = whole(placed);
   paper.size_m *= 1 + 2 * placed.margin;
   for (const Eigen::Vector2d& px : true_corners(lens, paper)) {
     low = low.cwiseMin(px);
@@ -98,7 +105,11 @@ cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& si
 class MarkerPainter {
  public:
   MarkerPainter(const Lens& lens, const PlacedMarker& placed, const ImageOptions& options)
-      : lens_(lens), placed_(placed), plane_(placed), options_(options), cells_(cells_of(placed.marker)) {}
+      : lens_(lens),
+        placed_(placed),
+        plane_(whole(placed)),
+        options_(options),
+        cells_(drawing_of(placed).image) {}
 
   void paint(cv::Mat& image, std::mt19937_64& rng) const {
     const cv::Rect box = bounds(lens_, placed_, image.size());

@@ -18,13 +18,15 @@ struct PlacedMarker {
   MarkerName marker;
   Pose camera_from_marker;
   double size_m = 0.08;
-  double margin = 0.125;  ///< white paper around it, as share of its side
+  double margin = 0.125;  ///< white paper around what is printed, as share of the print's side
   /// How far the middles of its upper and lower sides lie below their chords, as share of its side: paper
   /// around a cylinder, seen along the cylinder's axis from above. The corners do not move.
   double bow = 0;
   /// Rolling shutter: px by which the image moves from one row to the next; zero shift at the row of the
   /// marker's centre.
   Eigen::Vector2d row_motion = Eigen::Vector2d::Zero();
+  /// Drawn instead of the marker's own cells, one pixel for each cell, if it is not empty.
+  cv::Mat cells = {};
 };
 
 struct ImageOptions {
