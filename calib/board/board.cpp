@@ -1,7 +1,9 @@
 #include "calib/board/board.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <numeric>
 
 #include "calib/board/board_dictionary.h"
@@ -9,6 +11,14 @@
 
 namespace limn::calib {
 namespace {
+
+// Boards without markers, by their names.
+const std::map<std::string, BoardKind> k_plain_kinds = {{"chessboard", BoardKind::chessboard},
+                                                        {"circles", BoardKind::circles},
+                                                        {"acircles", BoardKind::asymmetric_circles}};
+
+// Radius of printed circles, as a share of the spacing.
+constexpr double k_circle_radius = 0.25, k_shifted_radius = 0.45;
 
 std::vector<std::string> split(const std::string& text, char at) {
   std::vector<std::string> parts(1);
@@ -85,7 +95,7 @@ struct PixelGrid {
   int cell = 0;
 };
 PixelGrid pixel_grid(const Board& board, int least) {
-  if (board.kind == BoardKind::chessboard) {
+  if (board.kind != BoardKind::charuco) {
     int square = least;
     while (square < 2 * least && !near_whole(square / board.square_m)) ++square;
     return {square < 2 * least ? square : least, 0};
@@ -119,19 +129,24 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
 }
 
 Result<Board> Board::parse(const std::string& text) {
-  constexpr auto k_forms = "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7 or chessboard:9x7:75mm";
+  constexpr auto k_forms =
+      "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7, chessboard:9x7:75mm, circles:11x7:20mm or "
+      "acircles:4x11:20mm";
   const auto parts = split(text, ':');
   Board board;
   const bool charuco = parts[0] == "charuco";
-  if (!charuco && parts[0] != "chessboard") return error("board '{}': expected {}.", text, k_forms);
+  const auto plain = k_plain_kinds.find(parts[0]);
+  if (!charuco && plain == k_plain_kinds.end()) return error("board '{}': expected {}.", text, k_forms);
   if (parts.size() < 3 || parts.size() > (charuco ? 5U : 3U))
     return error("board '{}': expected {}.", text, k_forms);
-  board.kind = charuco ? BoardKind::charuco : BoardKind::chessboard;
+  board.kind = charuco ? BoardKind::charuco : plain->second;
   const int least = charuco ? 3 : 2;
   if (!read_size(parts[1], &board.columns, &board.rows) || board.columns < least || board.rows < least ||
       board.columns > 100 || board.rows > 100)
     return error("board '{}': expected {}, such as 11x8, found '{}'.", text,
-                 charuco ? "the number of squares (3 to 100)" : "the number of inner corners (2 to 100)",
+                 charuco              ? "the number of squares (3 to 100)"
+                 : board.is_circles() ? "the number of circles (2 to 100)"
+                                      : "the number of inner corners (2 to 100)",
                  parts[1]);
   if (!read_length(parts[2], &board.square_m))
     return error(
@@ -149,8 +164,8 @@ Result<Board> Board::parse(const std::string& text) {
 
 std::string Board::text() const {
   const double mm = square_m * 1e3;
-  if (kind == BoardKind::chessboard)
-    return fmt::format("chessboard:{}x{}:{:.10g}mm", columns - 1, rows - 1, mm);
+  for (const auto& [name, plain] : k_plain_kinds)
+    if (plain == kind) return fmt::format("{}:{}x{}:{:.10g}mm", name, columns - 1, rows - 1, mm);
   std::string base = fmt::format("charuco:{}x{}:{:.10g}mm", columns, rows, mm);
   const bool plain_share = marker_share == 0.75;
   if (!plain_share || dictionary != default_dictionary(marker_count(*this))) base += ":" + dictionary;
@@ -160,8 +175,36 @@ std::string Board::text() const {
 
 Eigen::Vector3d Board::p_corner(int id) const {
   const int column = id % (columns - 1), row = id / (columns - 1);
-  return {(column + 1) * square_m, (row + 1) * square_m, 0};
+  const int across = is_shifted() ? 2 * column + row % 2 : column;
+  return {(across + 1) * square_m, (row + 1) * square_m, 0};
 }
+
+bool Board::is_ambiguous() const {
+  if (kind == BoardKind::chessboard) return (columns + rows) % 2 == 0;
+  return kind == BoardKind::circles || (is_shifted() && (rows - 1) % 2 == 0);
+}
+
+namespace {
+
+// Draws the circles; pixels on an edge are as dark as their share of the circle.
+void draw_circles(const Board& board, BoardSheet* sheet) {
+  const double radius = board.square_m * (board.is_shifted() ? k_shifted_radius : k_circle_radius);
+  const double radius_px = radius * sheet->pixels_per_metre;
+  for (int id = 0; id < board.corner_count(); ++id) {
+    const Eigen::Vector2d px =
+        sheet->px_board_origin + sheet->pixels_per_metre * board.p_corner(id).head<2>();
+    const int reach = static_cast<int>(radius_px) + 2;
+    const int x0 = static_cast<int>(px.x()), y0 = static_cast<int>(px.y());
+    for (int y = y0 - reach; y <= y0 + reach; ++y) {
+      for (int x = x0 - reach; x <= x0 + reach; ++x) {
+        const double share = std::clamp(radius_px - (Eigen::Vector2d(x, y) - px).norm() + 0.5, 0.0, 1.0);
+        if (share > 0) sheet->image.at<uchar>(y, x) = static_cast<uchar>(std::lround(255 * (1 - share)));
+      }
+    }
+  }
+}
+
+}  // namespace
 
 BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   const PixelGrid grid = pixel_grid(board, std::max(options.square_px, 8));
@@ -169,8 +212,13 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   BoardSheet sheet;
   sheet.pixels_per_metre = grid.square / board.square_m;
   sheet.px_board_origin = Eigen::Vector2d::Constant(margin - 0.5);
-  sheet.image = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + board.columns * grid.square,
-                        CV_8U, cv::Scalar(255));
+  const int across = board.is_shifted() ? 2 * board.columns - 1 : board.columns;
+  sheet.image = cv::Mat(2 * margin + board.rows * grid.square, 2 * margin + across * grid.square, CV_8U,
+                        cv::Scalar(255));
+  if (board.is_circles()) {
+    draw_circles(board, &sheet);
+    return sheet;
+  }
   cv::Ptr<cv::aruco::Dictionary> dictionary;
   if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
   int id = 0;
