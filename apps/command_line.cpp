@@ -267,8 +267,10 @@ void add_patterns(CLI::App& app, Run& run) {
 
 // The options of captures that another program took; --poses is the caller's. They live in `options`.
 void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
-  add_choice(command, "--import", &options->import_format, wizard::k_import_formats,
-             "Read captures of another program: opencv-gray, Gray code in any order");
+  add_choice(
+      command, "--import", &options->import_format, wizard::k_import_formats,
+      "Read captures of another program: opencv-gray, Gray code in any order; phase, phase-shifted waves as "
+      "--steps, --periods, --cue, --wave and --order describe");
   command->add_option("--projector", options->projector,
                       "With --import: size of the projector in pixels, such as 1024x768");
   command->add_option(
@@ -297,6 +299,27 @@ void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
           "With --import: width of the narrowest stripes in projector pixels (without it: by the number "
           "of images)")
       ->check(CLI::Range(1, 16));
+  command->add_option("--steps", options->steps, "With --import phase: images of one wave")
+      ->capture_default_str();
+  command
+      ->add_option("--periods", options->periods,
+                   "With --import phase: lengths of the waves in projector pixels, longest first, such as "
+                   "1024,128,16; the first covers the projector unless there is a cue")
+      ->delimiter(',');
+  command
+      ->add_option("--row-periods", options->row_periods,
+                   "With --import phase: lengths of the waves along the rows (without it: as the columns')")
+      ->delimiter(',');
+  command->add_flag(
+      "--cue", options->is_cued,
+      "With --import phase: before each axis's waves, images of a Gray code number the waves of the "
+      "first period; with --order inverse-second each is followed by its inverse");
+  add_choice(command, "--wave", &options->wave, calib::k_wave_forms,
+             "With --import phase: form of the waves, value = wave(2 pi (x / period - step / steps)): cos, "
+             "sin, -cos "
+             "or -sin (--wave=-sin)");
+  command->add_flag("--backward", options->is_backward,
+                    "With --import phase: the steps run the other way, + step / steps");
 }
 
 void add_solve(CLI::App& app, Run& run) {
@@ -306,6 +329,9 @@ void add_solve(CLI::App& app, Run& run) {
       "Example: limn solve captures --out rig\n"
       "Example: limn solve photos --import opencv-gray --projector 1024x768 --board chessboard:9x7:75mm "
       "--poses 'capture_*' --shots 'graycode_*.png' --out rig\n"
+      "Example: limn solve photos --import phase --projector 1280x800 --steps 4 --periods 1280,160,20 "
+      "--order "
+      "white-first --board chessboard:9x7:75mm --out rig\n"
       "Example: limn solve photos --cameras-only --board chessboard:9x6:25mm --shots 'left*.jpg,right*.jpg' "
       "--out "
       "rig");

@@ -1,5 +1,6 @@
 #include "wizard/measure/foreign_options.h"
 
+#include "calib/foreign_phase.h"
 #include "wizard/measure/pixel_size.h"
 
 namespace limn::wizard {
@@ -7,6 +8,36 @@ namespace {
 
 // A board that nobody has, for scans whose images show none.
 constexpr const char* k_no_board = "charuco:30x30:1mm";
+
+Result<calib::PhaseSeries> phase_series_of(const ForeignOptions& foreign) {
+  LIMN_TRY(const calib::KnownOrder known, calib::KnownOrder::parse(foreign.order));
+  using enum calib::WhitePlace;
+  calib::PhaseSeries series;
+  series.steps = foreign.steps;
+  series.column_periods = foreign.periods;
+  series.row_periods = foreign.row_periods;
+  series.is_cued = foreign.is_cued;
+  series.cue_inverses = known.inverses.value_or(calib::InversePlace::none);
+  series.axes = known.axes.value_or(calib::AxisOrder::columns_rows);
+  const std::string white = known.white.value_or("white-last");
+  series.white = white == "white-first"   ? white_black_first
+                 : white == "black-first" ? black_white_first
+                 : white == "no-white"    ? absent
+                                          : white_black_last;
+  series.wave = foreign.wave;
+  series.is_backward = foreign.is_backward;
+  const bool is_readable = series.cue_inverses != calib::InversePlace::behind &&
+                           series.cue_inverses != calib::InversePlace::before &&
+                           series.axes != calib::AxisOrder::columns &&
+                           series.axes != calib::AxisOrder::rows && !known.finest_first.value_or(false);
+  if (!is_readable)
+    return usage_error(
+        "--order {}: with --import phase expected columns-first or rows-first, inverse-second, inverse-first "
+        "or "
+        "no-inverses for the cue, and white-first, black-first, white-last or no-white.",
+        foreign.order);
+  return series;
+}
 
 Result<calib::CaptureSet> foreign_captures(const std::filesystem::path& folder,
                                            const std::vector<std::string>& skip_poses,
@@ -19,6 +50,11 @@ Result<calib::CaptureSet> foreign_captures(const std::filesystem::path& folder,
   LIMN_TRY(const PixelSize size, parse_pixel_size(foreign.projector));
   const auto board = calib::Board::parse(foreign.board.empty() ? k_no_board : foreign.board);
   if (!board) return usage_error("--board: {}", board.message());
+  if (foreign.import_format == ImportFormat::phase) {
+    LIMN_TRY(const calib::PhaseSeries series, phase_series_of(foreign));
+    return calib::import_phase(
+        {folder, size.width, size.height, *board, foreign.poses, foreign.shots, skip_poses, series});
+  }
   return calib::import_opencv_gray({folder, size.width, size.height, *board, foreign.poses, foreign.shots,
                                     skip_poses, foreign.order, foreign.step_px});
 }
