@@ -279,13 +279,76 @@ void add_patterns(CLI::App& app, Run& run) {
   command->callback([options, &run] { run = [options] { return report_result(run_patterns(*options)); }; });
 }
 
+// The options of captures that another program took; --poses is the caller's. They live in `options`.
+void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
+  add_choice(
+      command, "--import", &options->import_format, wizard::k_import_formats,
+      "Read captures of another program: opencv-gray, Gray code in any order; phase, phase-shifted waves as "
+      "--steps, --periods, --cue, --wave and --order describe");
+  command->add_option("--projector", options->projector,
+                      "With --import: size of the projector in pixels, such as 1024x768");
+  command->add_option(
+      "--board", options->board,
+      "With --import or --cameras-only: board, such as chessboard:9x7:75mm (counted in inner corners), "
+      "charuco:11x8:25mm, circles:11x7:20mm or acircles:4x11:20mm");
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--shots",
+          [options](const std::vector<std::string>& patterns) {
+            options->shots = fmt::format("{}", fmt::join(patterns, ","));
+          },
+          "With --import: name pattern of the images; for several cameras one for each, separated by commas, "
+          "such as 'left_*.png,right_*.png' or camera0='left_*',camera1='right_*'")
+      ->delimiter(',')
+      ->default_str(options->shots);
+  command->add_option(
+      "--order", options->order,
+      "With --import: what is known of the images' order, words separated by commas: white-first, "
+      "black-first, "
+      "white-last, no-white; inverse-second, inverse-first, inverses-behind, inverses-before, no-inverses; "
+      "columns-first, rows-first, columns-only; widest-first, finest-first. The rest is found in the images");
+  command
+      ->add_option(
+          "--step", options->step_px,
+          "With --import: width of the narrowest stripes in projector pixels (without it: by the number "
+          "of images)")
+      ->check(CLI::Range(1, 16));
+  command->add_option("--steps", options->steps, "With --import phase: images of one wave")
+      ->capture_default_str();
+  command
+      ->add_option("--periods", options->periods,
+                   "With --import phase: lengths of the waves in projector pixels, longest first, such as "
+                   "1024,128,16; the first covers the projector unless there is a cue")
+      ->delimiter(',');
+  command
+      ->add_option("--row-periods", options->row_periods,
+                   "With --import phase: lengths of the waves along the rows (without it: as the columns')")
+      ->delimiter(',');
+  command->add_flag(
+      "--cue", options->is_cued,
+      "With --import phase: before each axis's waves, images of a Gray code number the waves of the "
+      "first period; with --order inverse-second each is followed by its inverse");
+  add_choice(command, "--wave", &options->wave, calib::k_wave_forms,
+             "With --import phase: form of the waves, value = wave(2 pi (x / period - step / steps)): cos, "
+             "sin, -cos "
+             "or -sin (--wave=-sin)");
+  command->add_flag("--backward", options->is_backward,
+                    "With --import phase: the steps run the other way, + step / steps");
+}
+
 void add_solve(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand(
       "solve", "Calibrate a rig from captures, with a report that says how accurate it is");
   command->footer(
       "Example: limn solve captures --out rig\n"
       "Example: limn solve photos --import opencv-gray --projector 1024x768 --board chessboard:9x7:75mm "
-      "--poses 'capture_*' --shots 'graycode_*.png' --out rig");
+      "--poses 'capture_*' --shots 'graycode_*.png' --out rig\n"
+      "Example: limn solve photos --import phase --projector 1280x800 --steps 4 --periods 1280,160,20 "
+      "--order "
+      "white-first --board chessboard:9x7:75mm --out rig\n"
+      "Example: limn solve photos --cameras-only --board chessboard:9x6:25mm --shots 'left*.jpg,right*.jpg' "
+      "--out "
+      "rig");
   auto options = std::make_shared<wizard::SolveCommandOptions>();
   command->add_option("captures", options->captures, "Captures folder")->required();
   command->add_option("--out", options->out, "Rig folder to write")->required();
@@ -306,17 +369,18 @@ void add_solve(CLI::App& app, Run& run) {
                    "Scale bar: two markers and their measured distance, such as 'apriltag_36h11:3 "
                    "apriltag_36h11:7 250mm'; repeat the option for more")
       ->allow_extra_args(false);
+  command->add_flag(
+      "--cameras-only", options->cameras_only,
+      "Solve the cameras alone, from photographs of the board (one for each pose: in one folder, or in "
+      "a folder for each camera) or from captures");
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print report.json instead of a table");
-  add_choice(command, "--import", &options->import_format, wizard::k_import_formats,
-             "Read captures of another program: opencv-gray");
-  command->add_option("--projector", options->projector,
-                      "With --import: size of the projector in pixels, such as 1024x768");
-  command->add_option("--board", options->board,
-                      "With --import: board, such as chessboard:9x7:75mm (counted in inner corners)");
-  command->add_option("--poses", options->poses, "With --import: name pattern of the pose folders")
-      ->capture_default_str();
-  command->add_option("--shots", options->shots, "With --import: name pattern of the images")
+  add_foreign_options(command, &options->foreign);
+  command
+      ->add_option(
+          "--poses", options->foreign.poses,
+          "With --import: name pattern of the pose folders. Where none matches, the folder holds the "
+          "images of all poses")
       ->capture_default_str();
   command->callback(
       [options, json, &run] { run = [options, json] { return report_result(run_solve(*options, *json)); }; });
@@ -371,6 +435,8 @@ void add_scan(CLI::App& app, Run& run) {
       "show the\n"
       "board are left out. With --moved the prototype may be in another place in each pose.\n"
       "Example: limn scan captures --rig rig --far 1.8 --out scan\n"
+      "Example: limn scan photos --import opencv-gray --projector 1024x768 --poses 'scene_*' --rig rig --out "
+      "scan\n"
       "Example: limn scan --plan config/plans/bench.json --rig rig --out scan");
   auto options = std::make_shared<ScanCommand>();
   command->add_option("captures", options->captures,
@@ -382,8 +448,10 @@ void add_scan(CLI::App& app, Run& run) {
   command
       ->add_option(
           "--poses", options->poses,
-          "Names of poses to use, separated by commas; without it all poses that do not show the board")
+          "Names of poses to use, separated by commas; without it all poses that do not show the board. With "
+          "--import: name patterns of the pose folders")
       ->delimiter(',');
+  add_foreign_options(command, &options->foreign);
   command->add_flag("--moved", options->moved,
                     "The prototype was moved between poses; register each pose to the first one");
   command

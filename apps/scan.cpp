@@ -1,6 +1,7 @@
 #include "apps/scan.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "calib/capture_set.h"
 #include "core/file.h"
@@ -41,6 +42,20 @@ Status check_options(const ScanCommand& command) {
   return {};
 }
 
+// The captures; --poses of foreign captures says which folders are poses.
+Result<calib::CaptureSet> captures_to_scan(const ScanCommand& command,
+                                           const std::filesystem::path& folder,
+                                           calib::ScanOptions* options) {
+  wizard::ForeignOptions foreign = command.foreign;
+  if (!foreign.import_format) return wizard::captures_of(folder, {}, foreign);
+  if (!command.poses.empty()) foreign.poses = fmt::format("{}", fmt::join(command.poses, ","));
+  LIMN_TRY(calib::CaptureSet captures, wizard::captures_of(folder, {}, foreign, false));
+  options->poses.clear();
+  if (!foreign.board.empty()) return captures;
+  for (const calib::CapturedPose& pose : captures.poses) options->poses.push_back(pose.name);
+  return captures;
+}
+
 }  // namespace
 
 Status run_scan(const ScanCommand& command) {
@@ -55,8 +70,9 @@ Status run_scan(const ScanCommand& command) {
     LIMN_TRY_STATUS(
         wizard::capture_prototype(plan, {virtual_rig.world().world_from_prototype}, &virtual_rig, folder));
   }
-  LIMN_TRY(const calib::CaptureSet captures, calib::load_captures(folder));
-  LIMN_TRY(const calib::Scan scan, wizard::make_scan(captures, rig, options_of(command), command.out));
+  calib::ScanOptions options = options_of(command);
+  LIMN_TRY(const calib::CaptureSet captures, captures_to_scan(command, folder, &options));
+  LIMN_TRY(const calib::Scan scan, wizard::make_scan(captures, rig, options, command.out));
   for (const std::string& warning : scan.warnings) log_warning("scan: {}", warning);
   if (command.json) {
     LIMN_TRY(const std::string json, read_file(command.out / "scan.json"));

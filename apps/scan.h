@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "wizard/measure/foreign_options.h"
 
 namespace limn::apps {
 
@@ -12,9 +13,10 @@ struct ScanCommand {
   std::filesystem::path captures;  ///< Captures folder; empty with `plan`.
   std::filesystem::path
       plan;  ///< limn.plan/1: the prototype of its world is captured first, on the virtual rig.
+  wizard::ForeignOptions foreign = {};  ///< Describes captures of another program.
   std::filesystem::path rig;
   std::filesystem::path out;
-  std::vector<std::string> poses;
+  std::vector<std::string> poses;  ///< Names; with `foreign` they are patterns of names.
   bool moved = false;
   int pieces = 0;
   double near_m = 0, far_m = 0;  ///< 0: no limit.

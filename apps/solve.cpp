@@ -27,7 +27,8 @@ void print_report(const calib::Report& report) {
   for (const calib::DeviceQuality& d : assessment.devices)
     print_out("{:<14} {:>8.3f} {:>4}/{:<4} {:>7.0f} %\n", d.name, d.rms_px, d.outliers, d.points,
               100 * d.coverage);
-  print_out("{:<14} {:>8} {:>9}\n", "held-out pose", "RMS px", "cells");
+  const bool has_projectors = !report.observed.observations.projectors.empty();
+  print_out("{:<14} {:>8} {:>9}\n", "held-out pose", "RMS px", has_projectors ? "cells" : "corners");
   for (const calib::HeldOutPose& pose : assessment.held_out.poses)
     print_out("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
   for (const calib::ScaleBarCheck& check : report.scale_bar_lengths) {
@@ -39,8 +40,10 @@ void print_report(const calib::Report& report) {
   for (const calib::Fault& fault : assessment.faults)
     print_out("fault {}: {}; {}.\n", calib::to_text(fault.name), fault.evidence, fault.advice);
   for (const std::string& sentence : report.explanation.advice) print_out("advice: {}\n", sentence);
-  print_out("held-out {:.3f} px RMS, worst {:.3f} px; decoded {:.0f} %\n{}\n", assessment.held_out.rms_px,
-            assessment.held_out.worst_px, 100 * assessment.decoded_share, report.explanation.verdict);
+  print_out("held-out {:.3f} px RMS, worst {:.3f} px{}\n{}\n", assessment.held_out.rms_px,
+            assessment.held_out.worst_px,
+            has_projectors ? fmt::format("; decoded {:.0f} %", 100 * assessment.decoded_share) : "",
+            report.explanation.verdict);
 }
 
 }  // namespace

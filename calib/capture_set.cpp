@@ -1,40 +1,25 @@
 #include "calib/capture_set.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
+#include <map>
 #include <set>
 
+#include "calib/code/shot_order.h"
+#include "calib/code/white_black.h"
+#include "calib/shot_files.h"
+#include "calib/temporary_folder.h"
 #include "core/config.h"
+#include "core/file.h"
 #include "core/image_io.h"
+#include "core/log.h"
 #include "core/names.h"
 
 namespace limn::calib {
 namespace {
 
 namespace fs = std::filesystem;
-
-bool matches(const char* pattern, const char* text) {
-  if (*pattern == '*') return matches(pattern + 1, text) || (*text != '\0' && matches(pattern, text + 1));
-  if (*text == '\0') return *pattern == '\0';
-  return (*pattern == '?' || *pattern == *text) && matches(pattern + 1, text + 1);
-}
-
-// Names of directories or files in `folder` that match the pattern, sorted.
-std::vector<std::string> names_in(const fs::path& folder, const std::string& pattern, bool directories) {
-  std::vector<std::string> names;
-  std::error_code problem;
-  for (const auto& entry : fs::directory_iterator(folder, problem)) {
-    std::string name = entry.path().filename().string();
-    if (entry.is_directory() == directories && matches(pattern.c_str(), name.c_str()))
-      names.push_back(std::move(name));
-  }
-  // 2 comes before 10 when numbers have no leading zeros: fewer digits first within the same stem.
-  std::sort(names.begin(), names.end(), [](const std::string& a, const std::string& b) {
-    const auto stem = [](const std::string& s) { return s.substr(0, s.find_last_not_of("0123456789") + 1); };
-    if (stem(a) == stem(b) && a.size() != b.size()) return a.size() < b.size();
-    return a < b;
-  });
-  return names;
-}
 
 // Pose directories that match, without those in `skip`.
 Result<std::vector<std::string>> pose_names(const fs::path& folder,
@@ -155,6 +140,95 @@ Status read_patterns(const Config& config, CaptureSet* captures) {
   return {};
 }
 
+// Every series of every camera and pose.
+std::vector<std::vector<fs::path>> all_series(const ShotFiles& shots) {
+  std::vector<std::vector<fs::path>> series;
+  for (const ShotPose& pose : shots.poses) series.insert(series.end(), pose.files.begin(), pose.files.end());
+  return series;
+}
+
+// The number of images that most series have.
+int usual_count(const ShotFiles& shots) {
+  std::map<int, int> series;
+  for (const std::vector<fs::path>& files : all_series(shots)) ++series[static_cast<int>(files.size())];
+  return std::max_element(series.begin(), series.end(),
+                          [](const auto& a, const auto& b) { return a.second < b.second; })
+      ->first;
+}
+
+// Checks that every series has the same number of images, and one that a Gray code can have.
+Status check_counts(const ForeignCaptureSet& foreign,
+                    const Patterns& whole,
+                    const ShotFiles& shots,
+                    const std::vector<int>& counts) {
+  const int usual = usual_count(shots);
+  const bool is_possible = std::find(counts.begin(), counts.end(), usual) != counts.end();
+  for (const ShotPose& pose : shots.poses) {
+    for (size_t camera = 0; camera < pose.files.size(); ++camera) {
+      const int count = static_cast<int>(pose.files[camera].size());
+      if (is_possible && count == usual) continue;
+      const std::string where = fmt::format("{}: {}", (foreign.folder / pose.name).string(),
+                                            shots.cameras.size() > 1 ? shots.cameras[camera] + ": " : "");
+      if (is_possible)
+        return error(
+            "{}expected {} images '{}', as in the other poses, found {}. Leave the pose out with "
+            "--skip-poses, or check --shots.",
+            where, usual, foreign.shots, count);
+      return error(
+          "{}expected {} images '{}' ({}x{} Gray code with inverses, white and black), or {} of other "
+          "orders{}, "
+          "found {}. Leave the pose out with --skip-poses, or check --projector and --shots.",
+          where, counts.empty() ? whole.count() : counts[0], foreign.shots, whole.width, whole.height,
+          fmt::join(counts.begin() + std::min<std::ptrdiff_t>(1, std::ssize(counts)), counts.end(), ", "),
+          foreign.order.empty() ? "" : fmt::format(" that --order {} allows", foreign.order), count);
+    }
+  }
+  return {};
+}
+
+void report_order(const FoundOrder& found, const KnownOrder& known) {
+  const std::string order = to_text(found.order);
+  if (found.is_assumed)
+    log_warning("order: {} (assumed: the images show too little light of the projector to find it)", order);
+  else
+    log_info("order: {} (found in the images{})", order,
+             known.text.empty() ? "" : fmt::format(" with --order {}", known.text));
+  if (found.is_step_assumed)
+    log_warning(
+        "order: stripes of {} pixels explain the number of images, but other widths do, too. If the "
+        "projected "
+        "stripes are wider, say so with --step.",
+        found.order.step_px);
+}
+
+std::vector<fs::path> in_order(const std::vector<fs::path>& files, const FoundOrder& found) {
+  std::vector<fs::path> ordered;
+  for (const int shot : found.shots)
+    ordered.push_back(shot < 0 ? fs::path() : files[static_cast<size_t>(shot)]);
+  return ordered;
+}
+
+// Computes white and black of every series and stores them in a temporary folder.
+Status make_white_and_black(CaptureSet* captures) {
+  LIMN_TRY(TemporaryFolder made, TemporaryFolder::create());
+  const auto folder = std::make_shared<const TemporaryFolder>(std::move(made));
+  captures->made_images = folder;
+  for (CapturedPose& pose : captures->poses) {
+    for (size_t camera = 0; camera < captures->cameras.size(); ++camera) {
+      std::vector<fs::path>& files = pose.images[0][camera];
+      const bool inverses = captures->patterns[0].options.inverses;
+      LIMN_TRY(const WhiteBlack images, white_black_of({files.begin(), files.end() - 2}, inverses));
+      const fs::path into = folder->path() / pose.name / captures->cameras[camera].name;
+      LIMN_TRY_STATUS(make_folder(into));
+      files.end()[-2] = into / "white.png";
+      files.end()[-1] = into / "black.png";
+      LIMN_TRY_STATUS(write_png(files.end()[-2], images.white, {.compression = 1}));
+      LIMN_TRY_STATUS(write_png(files.end()[-1], images.black, {.compression = 1}));
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 CaptureSet plan_captures(const fs::path& folder,
@@ -201,29 +275,32 @@ Result<CaptureSet> load_captures(const fs::path& folder, const std::vector<std::
 }
 
 Result<CaptureSet> import_opencv_gray(const ForeignCaptureSet& foreign) {
-  if (!fs::is_directory(foreign.folder))
-    return error("{}: expected a folder of captures, found none.", foreign.folder.string());
-  LIMN_TRY(const Patterns patterns,
-           Patterns::create(PatternCode::gray, foreign.projector_width, foreign.projector_height));
-  CaptureSet captures{foreign.folder, {{"camera0", 0, 0}}, {{"projector0", patterns.width, patterns.height}},
-                      {patterns},     foreign.board,       {}};
-  LIMN_TRY(const auto names, pose_names(foreign.folder, foreign.poses, foreign.skip));
-  for (const std::string& name : names) {
-    std::vector<fs::path> files;
-    for (const std::string& file : names_in(foreign.folder / name, foreign.shots, false))
-      files.push_back(foreign.folder / name / file);
-    if (static_cast<int>(files.size()) != patterns.count())
-      return error(
-          "{}: expected {} images '{}' ({}x{} Gray code with inverses, white and black), found {}. Leave "
-          "the pose out with --skip-poses, or check --projector and --shots.",
-          (foreign.folder / name).string(), patterns.count(), foreign.shots, patterns.width, patterns.height,
-          files.size());
-    captures.poses.push_back({name, {{std::move(files)}}});
+  LIMN_TRY(KnownOrder known, KnownOrder::parse(foreign.order));
+  if (foreign.step_px > 0) known.step_px = foreign.step_px;
+  LIMN_TRY(const Patterns whole,
+           Patterns::create(PatternCode::gray, foreign.projector_width, foreign.projector_height,
+                            {.step_px = known.step_px.value_or(1)}));
+  const std::vector<int> counts = gray_code_counts(whole.width, whole.height, known);
+  LIMN_TRY(const ShotFiles shots,
+           find_shots({foreign.folder, foreign.poses, foreign.shots, foreign.skip}, [&](int count) {
+             return std::find(counts.begin(), counts.end(), count) != counts.end();
+           }));
+  LIMN_TRY_STATUS(check_counts(foreign, whole, shots, counts));
+  LIMN_TRY(const FoundOrder found, find_shot_order(all_series(shots), whole.width, whole.height, known));
+  report_order(found, known);
+  CaptureSet captures{foreign.folder, {}, {{"projector0", whole.width, whole.height}}, {found.patterns},
+                      foreign.board,  {}};
+  for (size_t i = 0; i < shots.cameras.size(); ++i) {
+    LIMN_TRY(const cv::Mat first, read_image(shots.poses[0].files[i][0]));
+    captures.cameras.push_back({shots.cameras[i], first.cols, first.rows});
   }
-  if (captures.poses.empty()) return error("{}: all poses are skipped.", foreign.folder.string());
-  LIMN_TRY(const cv::Mat first, read_image(captures.poses[0].images[0][0][0]));
-  captures.cameras[0].width = first.cols;
-  captures.cameras[0].height = first.rows;
+  for (const ShotPose& pose : shots.poses) {
+    captures.poses.push_back({pose.name, {}});
+    captures.poses.back().images.emplace_back();
+    for (const std::vector<fs::path>& files : pose.files)
+      captures.poses.back().images[0].push_back(in_order(files, found));
+  }
+  if (!found.order.has_white()) LIMN_TRY_STATUS(make_white_and_black(&captures));
   return captures;
 }
 

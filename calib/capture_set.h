@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,8 @@ struct CaptureSet {
   std::vector<CapturedPose> poses;  ///< sorted by name
   /// Lengths measured by hand, as calib/judge/scale_bar.h reads them; "scale_bar_lengths" in capture.json.
   std::vector<std::string> scale_bar_lengths = {};
+  /// Keeps images that an import computed (white and black of series that lack them) as long as this exists.
+  std::shared_ptr<const void> made_images = {};
 };
 
 /// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet.
@@ -56,16 +59,21 @@ std::filesystem::path image_path(
 Result<CaptureSet> load_captures(const std::filesystem::path& folder,
                                  const std::vector<std::string>& skip = {});
 
-/// Images that another program captured: one camera, one projector, OpenCV's Gray code.
+/// Images of a Gray code that another program captured: one projector, one or more cameras.
 struct ForeignCaptureSet {
   std::filesystem::path folder;
   int projector_width = 0;
   int projector_height = 0;
   Board board;
-  std::string poses = "pose*";    ///< names of the pose directories; * matches any text, ? any character
-  std::string shots = "*.png";    ///< names of the images in each, in the order of their names
+  std::string poses = "pose*";    ///< as in ShotPlaces (calib/shot_files.h)
+  std::string shots = "*";        ///< as in ShotPlaces: the images' names, for each camera
   std::vector<std::string> skip;  ///< as in load_captures
+  std::string order =
+      {};           ///< words about the order of the images, as in KnownOrder::parse; empty: found in them
+  int step_px = 0;  ///< width of the narrowest stripes; 0: found by the number of images
 };
+/// Finds the images and which pattern each shows (calib/code/shot_order.h), and says so. White and black that
+/// the series lack are computed.
 Result<CaptureSet> import_opencv_gray(const ForeignCaptureSet& foreign);
 
 }  // namespace limn::calib

@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "calib/measurement_model.h"
 #include "core/parallel.h"
 
 namespace limn::calib {
@@ -15,6 +16,10 @@ using Eigen::Vector2d;
 
 std::vector<int> scored_poses(const Observations& observations, const Solution& solution) {
   std::set<int> poses;
+  for (const CornerObservation& corner : observations.corners) {
+    const bool counts = observations.projectors.empty();  // else the matches are scored
+    if (counts && solution.world_from_board[static_cast<size_t>(corner.pose)]) poses.insert(corner.pose);
+  }
   for (const Match& match : observations.matches) {
     if (solution.world_from_board[static_cast<size_t>(match.pose)]) poses.insert(match.pose);
   }
@@ -51,6 +56,40 @@ struct PoseScore {
   int cells = 0;
 };
 
+// Whether the board's pose is estimated from this corner, or the corner is predicted: alternating, as the
+// colours of a chessboard.
+bool gives_pose(const Board& board, int corner) {
+  const int across = board.columns - 1;
+  return (corner % across + corner / across) % 2 == 0;
+}
+
+// Without projectors: the board's pose from half of the corners predicts the other half.
+void score_corners(const Observations& observations, const Solution& left, int pose, PoseScore* score) {
+  constexpr std::ptrdiff_t k_least = 6;  // corners that a pose is estimated from
+  Observations half = observations;
+  std::erase_if(half.corners, [&](const CornerObservation& corner) {
+    return corner.pose != pose || !gives_pose(observations.board, corner.corner);
+  });
+  if (std::ssize(half.corners) < k_least) return;
+  const auto world_from_board = board_pose_from_cameras(half, left, pose);
+  if (!world_from_board) {
+    score->status = error("held-out pose {}: {}", observations.poses[static_cast<size_t>(pose)],
+                          world_from_board.message());
+    return;
+  }
+  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+  for (const CornerObservation& corner : observations.corners) {
+    if (corner.pose != pose || gives_pose(observations.board, corner.corner)) continue;
+    const Imager& camera = left.rig.cameras[static_cast<size_t>(corner.camera)];
+    Vector2d px;
+    if (!predict_corner({camera.lens.model, camera.lens.values, camera.imager_from_world}, *world_from_board,
+                        shape, left.bend_m, observations.board.p_corner(corner.corner).head<2>(), &px))
+      continue;
+    score->squared += (px - corner.px).squaredNorm();
+    ++score->cells;
+  }
+}
+
 PoseScore score_pose(const Observations& observations,
                      const SolveOptions& options,
                      const Solution& solution,
@@ -64,12 +103,16 @@ PoseScore score_pose(const Observations& observations,
     score.status = error("held-out solve without {}: {}", name, left.message());
     return score;
   }
+  score.rig = left->rig;
+  if (observations.projectors.empty()) {
+    score_corners(observations, *left, pose, &score);
+    return score;
+  }
   const auto world_from_board = board_pose_from_cameras(observations, *left, pose);
   if (!world_from_board) {
     score.status = error("held-out pose {}: {}", name, world_from_board.message());
     return score;
   }
-  score.rig = left->rig;
   for (size_t i = 0; i < observations.matches.size(); ++i) {
     const Match& match = observations.matches[i];
     if (match.pose != pose) continue;
@@ -124,7 +167,8 @@ Result<CrossValidation> cross_validate(const Observations& observations,
     cells += scores[i].cells;
   }
   if (cells == 0)
-    return error("held-out: no match of any pose could be predicted. Capture more board poses.");
+    return error("held-out: no {} of any pose could be predicted. Capture more board poses.",
+                 observations.projectors.empty() ? "corner" : "match");
   score.rms_px = std::sqrt(squared / cells);
   return score;
 }

@@ -98,6 +98,46 @@ class Grid {
   std::vector<std::optional<Vector2d>> points_;
 };
 
+// The four points of a square, in order around it.
+using Quad = std::array<Vector2d, 4>;
+
+std::vector<Quad> squares_of(const Board& board, const std::vector<BoardCorner>& corners) {
+  const Grid grid(board, corners);
+  std::vector<Quad> squares;
+  for (int row = 0; row < board.rows; ++row) {
+    for (int column = 0; column < board.columns; ++column) {
+      const auto &a = grid.at(column, row), &b = grid.at(column + 1, row), &c = grid.at(column + 1, row + 1),
+                 &d = grid.at(column, row + 1);
+      if (a && b && c && d) squares.push_back({*a, *b, *c, *d});
+    }
+  }
+  return squares;
+}
+
+// The squares between four circles of an asymmetric grid; they stand on their corners.
+std::vector<Quad> diamonds_of(const Board& board, const std::vector<BoardCorner>& corners) {
+  const int across = board.columns - 1, down = board.rows - 1;
+  // By the place on the lattice: `x` in spacings.
+  const auto at = [&](int x, int row) -> const BoardCorner* {
+    const int column = (x - row % 2) / 2;
+    if (x < row % 2 || column >= across || row >= down) return nullptr;
+    const auto found = std::find_if(corners.begin(), corners.end(), [&](const BoardCorner& corner) {
+      return corner.id == row * across + column;
+    });
+    return found == corners.end() ? nullptr : &*found;
+  };
+  std::vector<Quad> diamonds;
+  for (int row = 0; row + 2 < down; ++row) {
+    for (int column = 0; column < across; ++column) {
+      const int x = 2 * column + row % 2;
+      const BoardCorner *a = at(x, row), *b = at(x + 1, row + 1), *c = at(x, row + 2),
+                        *d = at(x - 1, row + 1);
+      if (a && b && c && d) diamonds.push_back({a->px, b->px, c->px, d->px});
+    }
+  }
+  return diamonds;
+}
+
 struct Labelled {
   Vector2d px, label;
   double weight = 0;
@@ -165,10 +205,7 @@ std::optional<Match> fitted(std::vector<Labelled> pixels) {
 
 // The pixels of one square, by cell. `least_contrast`: minimum contrast of the 3 x 3 around each pixel.
 using Cells = std::array<Cell, k_cells * k_cells>;
-void collect(const std::array<Vector2d, 4>& quad,
-             const Decoded& decoded,
-             const cv::Mat& least_contrast,
-             Cells* cells) {
+void collect(const Quad& quad, const Decoded& decoded, const cv::Mat& least_contrast, Cells* cells) {
   std::array<cv::Point2f, 4> from, to = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
   Vector2d low = quad[0], high = quad[0];
   double side = 1e9;
@@ -412,21 +449,15 @@ Observed joined(Observed first, Observed more) {
 std::vector<Match> matches_on_board(const Board& board,
                                     const std::vector<BoardCorner>& corners,
                                     const Decoded& decoded) {
-  const Grid grid(board, corners);
   cv::Mat least_contrast;
   cv::erode(decoded.contrast, least_contrast, cv::Mat());
   std::vector<Match> matches;
-  for (int row = 0; row < board.rows; ++row) {
-    for (int column = 0; column < board.columns; ++column) {
-      const auto &a = grid.at(column, row), &b = grid.at(column + 1, row), &c = grid.at(column + 1, row + 1),
-                 &d = grid.at(column, row + 1);
-      if (!a || !b || !c || !d) continue;
-      Cells cells;
-      collect({*a, *b, *c, *d}, decoded, least_contrast, &cells);
-      for (Cell& cell : cells) {
-        if (!cell.keep_bright()) continue;
-        if (auto match = fitted(std::move(cell.pixels))) matches.push_back(*match);
-      }
+  for (const Quad& quad : board.is_shifted() ? diamonds_of(board, corners) : squares_of(board, corners)) {
+    Cells cells;
+    collect(quad, decoded, least_contrast, &cells);
+    for (Cell& cell : cells) {
+      if (!cell.keep_bright()) continue;
+      if (auto match = fitted(std::move(cell.pixels))) matches.push_back(*match);
     }
   }
   return matches;

@@ -192,11 +192,12 @@ Result<Models> models_of(const Observations& observations, const SolveOptions& o
 // A chessboard that looks the same when turned may be read differently by two cameras.
 Status check_board_symmetry(const Observations& observations) {
   const Board& board = observations.board;
-  const bool ambiguous = board.kind == BoardKind::chessboard && (board.columns + board.rows) % 2 == 0;
-  if (ambiguous && observations.cameras.size() > 1)
+  if (board.is_ambiguous() && observations.cameras.size() > 1)
     return error(
         "board {}: looks the same when turned by 180 degrees, so {} cameras cannot agree on its corners. Use "
-        "a ChArUco board, or a chessboard with one even and one odd number of corners.",
+        "a ChArUco board, or a chessboard with one even and one odd number of corners, or an asymmetric grid "
+        "with "
+        "an odd number of rows.",
         board.text(), observations.cameras.size());
   return {};
 }

@@ -1,7 +1,9 @@
 #include "calib/board/board.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <opencv2/core.hpp>
 
@@ -10,6 +12,14 @@
 
 namespace limn::calib {
 namespace {
+
+// Boards without markers, by their names.
+const std::map<std::string, BoardKind> k_plain_kinds = {{"chessboard", BoardKind::chessboard},
+                                                        {"circles", BoardKind::circles},
+                                                        {"acircles", BoardKind::asymmetric_circles}};
+
+// Radius of printed circles, as a share of the spacing.
+constexpr double k_circle_radius = 0.25, k_shifted_radius = 0.45;
 
 std::vector<std::string> split(const std::string& text, char at) {
   std::vector<std::string> parts(1);
@@ -108,7 +118,7 @@ PixelGrid pixel_grid(const Board& board, int least) {
       if (near_whole(cell * cells * board.gap_share)) return {cell * cells, cell};
     return {first * cells, first};  // the gaps are rounded to whole pixels
   }
-  if (board.kind == BoardKind::chessboard) {
+  if (board.kind != BoardKind::charuco) {
     int square = least;
     while (square < 2 * least && !near_whole(square / board.square_m)) ++square;
     return {square < 2 * least ? square : least, 0};
@@ -152,23 +162,26 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
 
 Result<Board> Board::parse(const std::string& text) {
   constexpr auto k_forms =
-      "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7, chessboard:9x7:75mm or aprilgrid:6x6:88mm:0.3";
+      "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7, chessboard:9x7:75mm, aprilgrid:6x6:88mm:0.3, "
+      "circles:11x7:20mm or acircles:4x11:20mm";
   const auto parts = split(text, ':');
   Board board;
   const bool charuco = parts[0] == "charuco", aprilgrid = parts[0] == "aprilgrid";
-  if (!charuco && !aprilgrid && parts[0] != "chessboard")
+  const auto plain = k_plain_kinds.find(parts[0]);
+  if (!charuco && !aprilgrid && plain == k_plain_kinds.end())
     return error("board '{}': expected {}.", text, k_forms);
   const std::size_t most_parts = charuco ? 5 : aprilgrid ? 4 : 3;
   if (parts.size() < (aprilgrid ? 4 : 3) || parts.size() > most_parts)
     return error("board '{}': expected {}.", text, k_forms);
-  board.kind = charuco ? BoardKind::charuco : aprilgrid ? BoardKind::aprilgrid : BoardKind::chessboard;
+  board.kind = charuco ? BoardKind::charuco : aprilgrid ? BoardKind::aprilgrid : plain->second;
   const int least = charuco ? 3 : aprilgrid ? 1 : 2;
   if (!read_size(parts[1], &board.columns, &board.rows) || board.columns < least || board.rows < least ||
       board.columns > 100 || board.rows > 100)
     return error("board '{}': expected {}, such as 11x8, found '{}'.", text,
-                 charuco     ? "the number of squares (3 to 100)"
-                 : aprilgrid ? "the number of tags (1 to 100)"
-                             : "the number of inner corners (2 to 100)",
+                 charuco              ? "the number of squares (3 to 100)"
+                 : aprilgrid          ? "the number of tags (1 to 100)"
+                 : board.is_circles() ? "the number of circles (2 to 100)"
+                                      : "the number of inner corners (2 to 100)",
                  parts[1]);
   if (!read_length(parts[2], &board.square_m))
     return error(
@@ -190,8 +203,8 @@ Result<Board> Board::parse(const std::string& text) {
 
 std::string Board::text() const {
   const double mm = square_m * 1e3;
-  if (kind == BoardKind::chessboard)
-    return fmt::format("chessboard:{}x{}:{:.10g}mm", columns - 1, rows - 1, mm);
+  for (const auto& [name, plain] : k_plain_kinds)
+    if (plain == kind) return fmt::format("{}:{}x{}:{:.10g}mm", name, columns - 1, rows - 1, mm);
   if (kind == BoardKind::aprilgrid)
     return fmt::format("aprilgrid:{}x{}:{:.10g}mm:{:.10g}", columns / 2, rows / 2, mm, gap_share);
   std::string base = fmt::format("charuco:{}x{}:{:.10g}mm", columns, rows, mm);
@@ -203,7 +216,13 @@ std::string Board::text() const {
 
 Eigen::Vector3d Board::p_corner(int id) const {
   const int column = id % (columns - 1), row = id / (columns - 1);
-  return {p_line(column + 1), p_line(row + 1), 0};
+  const int across = is_shifted() ? 2 * column + row % 2 : column;
+  return {p_line(across + 1), p_line(row + 1), 0};
+}
+
+bool Board::is_ambiguous() const {
+  if (kind == BoardKind::chessboard) return (columns + rows) % 2 == 0;
+  return kind == BoardKind::circles || (is_shifted() && (rows - 1) % 2 == 0);
 }
 
 namespace {
@@ -217,6 +236,24 @@ void draw_tag(const Board& board, int id, int cell_px, cv::Mat square) {
   tag.copyTo(square(cv::Rect(border, border, tag.cols, tag.rows)));
 }
 
+// Draws the circles; pixels on an edge are as dark as their share of the circle.
+void draw_circles(const Board& board, BoardSheet* sheet) {
+  const double radius = board.square_m * (board.is_shifted() ? k_shifted_radius : k_circle_radius);
+  const double radius_px = radius * sheet->pixels_per_metre;
+  for (int id = 0; id < board.corner_count(); ++id) {
+    const Eigen::Vector2d px =
+        sheet->px_board_origin + sheet->pixels_per_metre * board.p_corner(id).head<2>();
+    const int reach = static_cast<int>(radius_px) + 2;
+    const int x0 = static_cast<int>(px.x()), y0 = static_cast<int>(px.y());
+    for (int y = y0 - reach; y <= y0 + reach; ++y) {
+      for (int x = x0 - reach; x <= x0 + reach; ++x) {
+        const double share = std::clamp(radius_px - (Eigen::Vector2d(x, y) - px).norm() + 0.5, 0.0, 1.0);
+        if (share > 0) sheet->image.at<uchar>(y, x) = static_cast<uchar>(std::lround(255 * (1 - share)));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 BoardSheet draw_board(const Board& board, const DrawOptions& options) {
@@ -228,7 +265,12 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
   const auto px = [&](int line) {
     return static_cast<int>(std::lround(sheet.pixels_per_metre * board.p_line(line)));
   };
-  sheet.image = cv::Mat(2 * margin + px(board.rows), 2 * margin + px(board.columns), CV_8U, cv::Scalar(255));
+  const int across = board.is_shifted() ? 2 * board.columns - 1 : board.columns;
+  sheet.image = cv::Mat(2 * margin + px(board.rows), 2 * margin + px(across), CV_8U, cv::Scalar(255));
+  if (board.is_circles()) {
+    draw_circles(board, &sheet);
+    return sheet;
+  }
   cv::Ptr<cv::aruco::Dictionary> dictionary;
   if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
   int id = 0;

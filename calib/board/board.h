@@ -9,7 +9,7 @@
 
 namespace limn::calib {
 
-enum class BoardKind { charuco, chessboard, aprilgrid };
+enum class BoardKind { charuco, chessboard, aprilgrid, circles, asymmetric_circles };
 
 /// A flat calibration target. Board frame: origin at the outer corner of the top-left square (the grid's
 /// corner, not the sheet's), x right, y down, z into the sheet; metres. The top-left square is black; on a
@@ -24,11 +24,16 @@ enum class BoardKind { charuco, chessboard, aprilgrid };
 ///                                              square's
 ///   `chessboard:9x7:75mm`                      9 x 7 INNER corners, that is 10 x 8 squares
 ///   `aprilgrid:6x6:88mm:0.3`                   6 x 6 tags of 88 mm, 0.3 x 88 mm apart (Kalibr's tagSpacing)
-/// Defaults: the smallest aruco_4x4 dictionary that has enough markers; 0.75 (whole cells: 8 to a square).
+///   `circles:11x7:20mm`                        11 x 7 black circles, 20 mm from centre to centre
+///   `acircles:4x11:20mm`                       OpenCV's asymmetric grid: 11 rows of 4 circles, 20 mm apart;
+///                                              circles of a row are 40 mm apart, every second row is shifted
+/// A circle grid's corners are the centres of its circles; its outermost ones lie one spacing from the
+/// board's origin and edges. The circles' radius is measured in the images. Defaults: the smallest aruco_4x4
+/// dictionary that has enough markers; 0.75 (whole cells: 8 to a square).
 struct Board {
   BoardKind kind = BoardKind::charuco;
-  int columns = 0;          ///< squares across (both kinds)
-  int rows = 0;             ///< squares down (both kinds)
+  int columns = 0;          ///< squares across; circle grids: one more than circles in a row
+  int rows = 0;             ///< squares down; circle grids: one more than rows
   double square_m = 0;      ///< AprilGrid: the side of a tag
   double gap_share = 0;     ///< AprilGrid: the narrow squares' side / the tags'
   std::string dictionary;   ///< ChArUco: OpenCV's predefined dictionary, `aruco_4x4_50`
@@ -47,12 +52,18 @@ struct Board {
     if (kind != BoardKind::aprilgrid) return line * square_m;
     return (line / 2 * (1 + gap_share) + line % 2 * gap_share) * square_m;
   }
-  double width_m() const { return p_line(columns); }
+  double width_m() const { return p_line(is_shifted() ? 2 * columns - 1 : columns); }
   double height_m() const { return p_line(rows); }
+  bool is_circles() const { return kind == BoardKind::circles || is_shifted(); }
+  /// Whether every second row is shifted.
+  bool is_shifted() const { return kind == BoardKind::asymmetric_circles; }
+  /// Whether the board looks the same when it is turned by 180 degrees.
+  bool is_ambiguous() const;
   bool is_black(int column, int row) const { return (column + row) % 2 == 0; }
 };
 
-/// The whole sheet as an exact image: every square and every marker cell is a whole number of pixels.
+/// The whole sheet as an exact image: every square and every marker cell is a whole number of pixels; the
+/// edges of circles are grey where they cross a pixel.
 struct BoardSheet {
   cv::Mat image;                ///< 8-bit grey: 0 black ink, 255 paper
   double pixels_per_metre = 0;  ///< for pHYs (the resolution in a PNG) and for texturing a plane

@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "calib/board/board_dictionary.h"
+#include "calib/board/circle_finder.h"
 #include "core/least_squares.h"
 
 namespace limn::calib {
@@ -424,6 +425,7 @@ std::vector<Expected> find_by_markers(const Board& board, const cv::Mat& grey) {
 
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey) {
   LIMN_CHECK(grey.type() == CV_8U);
+  if (board.is_circles()) return find_circle_grid(board, grey);
   constexpr size_t k_least = 4;  // fewer do not determine a pose
   std::vector<BoardCorner> corners;
   for (const Expected& at :

@@ -8,7 +8,7 @@
 
 namespace limn::calib {
 
-/// An inner corner found in an image.
+/// An inner corner, or the centre of a circle, found in an image.
 struct BoardCorner {
   int id = 0;
   Eigen::Vector2d px = Eigen::Vector2d::Zero();
@@ -24,7 +24,8 @@ constexpr double k_corner_floor_px = 0.005;
 /// squares over the pixels along both edges, up to 0.42 squares away, clear of the markers). So nothing
 /// depends on OpenCV's interpolation, which in 4.6 shifts ChArUco corners by half a pixel. A chessboard with
 /// an even number of squares both ways looks the same when turned by 180 degrees: its first corner is the one
-/// nearer to the image's top left.
+/// nearer to the image's top left. Circle grids:
+/// calib/board/circle_finder.h.
 std::vector<BoardCorner> find_board(const Board& board, const cv::Mat& grey);
 
 }  // namespace limn::calib

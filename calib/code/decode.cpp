@@ -27,7 +27,8 @@ constexpr int k_wide_stripe_px = 16;  // stripes that blur weakens at their edge
 constexpr float k_neighbours_px = 0.5F;
 // px^2: variance of labels 4 or more pixels wide, whose centre may be further off than their neighbours.
 constexpr float k_coarse_var = 1;
-constexpr float k_neighbours_var = 0.26F;  // px^2: variance of one of two neighbouring labels
+constexpr double k_blocks_from_median = 1.5;  // limit of an outlier where labels are several pixels wide
+constexpr float k_neighbours_var = 0.26F;     // px^2: variance of one of two neighbouring labels
 // Half squared standard deviations of noise for a label: 4 standard deviations.
 constexpr float k_max_cost = 8;
 
@@ -319,7 +320,7 @@ int count_unlabelled(const cv::Mat& marked, const cv::Mat& labels) {
 // fine as its base. `bit` counts from the projector's finest.
 bool measures_direct_light(int bit, const Code& code) {
   if (code.base < code.bits) return bit >= code.base;
-  return code.bits <= 5 || (bit >= 1 && bit <= 4);
+  return code.bits <= 5 || (bit >= 1 && bit <= std::max(4, code.lowest));
 }
 
 // Direct light: the mean size of image minus inverse over the bits that measure it.
@@ -448,10 +449,9 @@ AxisLabels labels_of(const AxisReading& axis,
   return labels;
 }
 
-// Converts blocks of 2^lowest projector pixels to pixels.
-void to_pixels(int lowest, AxisLabels* labels) {
-  if (lowest == 0) return;
-  const double block = 1 << lowest;
+// Converts blocks of projector pixels to pixels.
+void to_pixels(double block, AxisLabels* labels) {
+  if (block == 1) return;
   labels->px.convertTo(labels->px, CV_32F, block, (block - 1) / 2);
   labels->variance *= block * block;
 }
@@ -460,6 +460,7 @@ void to_pixels(int lowest, AxisLabels* labels) {
 double unsure_finest(const AxisReading& columns, const AxisReading& rows, const cv::Mat& step, int lit) {
   double worst = 0;
   for (const AxisReading* axis : {&columns, &rows}) {
+    if (axis->bits() == 0) continue;
     int unsure = 0;
     for (int y = 0; y < step.rows; ++y) {
       const short* difference = axis->differences.back().ptr<short>(y);
@@ -469,6 +470,22 @@ double unsure_finest(const AxisReading& columns, const AxisReading& rows, const 
     worst = std::max(worst, static_cast<double>(unsure) / std::max(1, lit));
   }
   return worst;
+}
+
+// The labels of an axis that was not shown: every pixel has one, until the series is decoded.
+AxisLabels any_label(const cv::Size& size) {
+  AxisLabels labels(size.height, size.width);
+  labels.px.setTo(0);
+  labels.variance.setTo(k_infinite);
+  return labels;
+}
+
+// Says that the rows are unknown.
+void forget_rows(Decoded* decoded) {
+  for (int y = 0; y < decoded->px_projector.rows; ++y) {
+    auto* px = decoded->px_projector.ptr<cv::Vec2f>(y);
+    for (int x = 0; x < decoded->px_projector.cols; ++x) px[x][1] = k_nan;
+  }
 }
 
 // Combines the axes where both have labels; returns the number of these pixels.
@@ -511,8 +528,8 @@ Result<Decoded> decode(const Patterns& patterns,
                 {cv::Mat(height, width, CV_16U, cv::Scalar(0))}};
   LIMN_TRY(const cv::Mat white, series.read(patterns.white()));
   LIMN_TRY(const cv::Mat black, series.read(patterns.black()));
-  const int lowest = patterns.lowest_bit();
-  const auto blocks = [&](int size) { return (size + (1 << lowest) - 1) >> lowest; };
+  const int lowest = patterns.lowest_bit(), block = patterns.block_px();
+  const auto blocks = [&](int size) { return (size + block - 1) / block; };
   const std::array<Code, 2> codes = {
       Code{patterns.column_bits(), lowest, patterns.base_bit(), blocks(patterns.width)},
       Code{patterns.row_bits(), lowest, patterns.base_bit(), blocks(patterns.height)}};
@@ -536,14 +553,19 @@ Result<Decoded> decode(const Patterns& patterns,
   std::vector<AxisLabels> labels;
   cv::Mat doubted(height, width, CV_8U, cv::Scalar(0));
   for (size_t axis = 0; axis < 2; ++axis) {
-    labels.push_back(labels_of(axes[axis], codes[axis], steps, noise, options, &doubted));
-    to_pixels(lowest, &labels.back());
+    labels.push_back(axes[axis].bits() > 0
+                         ? labels_of(axes[axis], codes[axis], steps, noise, options, &doubted)
+                         : any_label(steps.fine.size()));
+    to_pixels(block, &labels.back());
     if (!waves.empty()) refine_by_phase(waves[axis], noise, options.floor_px, &labels.back());
   }
   decoded.decoded = join(labels[0], labels[1], &decoded);
   const int contradicted = count_unlabelled(doubted, decoded.px_projector);
-  const int removed = remove_outliers(&decoded.px_projector, options.max_from_median);
+  // Neighbouring labels are a block apart.
+  const double limit = std::max(options.max_from_median, k_blocks_from_median * block);
+  const int removed = remove_outliers(&decoded.px_projector, waves.empty() ? limit : options.max_from_median);
   decoded.decoded -= removed;
+  if (axes[1].bits() == 0) forget_rows(&decoded);
   decoded.outliers = contradicted + removed;
   decoded.quality.unsure_finest = unsure_finest(axes[0], axes[1], steps.fine, decoded.lit);
   return decoded;

@@ -36,12 +36,14 @@ struct DecodeOptions {
 
 /// Which projector pixel illuminates each camera pixel.
 struct Decoded {
-  cv::Mat px_projector;  ///< CV_32FC2: column, row (pixel centres at integers); NaN where there is none
-  cv::Mat variance;      ///< CV_32FC2: variances of the two coordinates, px^2
-  cv::Mat contrast;      ///< CV_8U: white minus black, levels
-  int lit = 0;           ///< number of camera pixels that the projector illuminates directly
-  int decoded = 0;       ///< number of these with a label (outliers excluded)
-  int outliers = 0;      ///< removed: further than max_from_median from the median of their neighbours
+  /// CV_32FC2: column, row (pixel centres at integers); NaN where there is none. Where the series shows
+  /// columns only, the row is always NaN and its variance infinite.
+  cv::Mat px_projector;
+  cv::Mat variance;  ///< CV_32FC2: variances of the two coordinates, px^2
+  cv::Mat contrast;  ///< CV_8U: white minus black, levels
+  int lit = 0;       ///< number of camera pixels that the projector illuminates directly
+  int decoded = 0;   ///< number of these with a label (outliers excluded)
+  int outliers = 0;  ///< removed: further than max_from_median from the median of their neighbours
   /// Number of camera pixels whose white is at least min_contrast above black. In contrast to `lit`, it
   /// includes shadows illuminated by reflections and dark ink brightened by glare, whose bits hold no signal.
   int contrasted = 0;

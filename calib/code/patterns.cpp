@@ -18,17 +18,18 @@ namespace {
 constexpr int k_max_side = 16384;  // 14 bits; no projector is larger
 constexpr int k_min_period_px = 4, k_max_period_px = 256;
 constexpr int k_min_steps = 3, k_max_steps = 32;
+constexpr int k_max_step_px = 16;  // wider stripes measure no direct light
 constexpr double k_min_gamma = 0.2, k_max_gamma = 5;
-
-int bits_for(int size) { return static_cast<int>(std::bit_width(static_cast<unsigned>(size - 1))); }
 
 int gray_bit(int i, int bit) { return ((i ^ (i >> 1)) >> bit) & 1; }
 
-// Light of each position along an axis: that bit of its Gray code, combined with bit `base` if above it.
-std::vector<uchar> stripe(int size, int bit, int base, bool inverse) {
+// Light of each position along an axis: that bit of its label's Gray code, combined with bit `base` if above
+// it. `block`: pixels with one label.
+std::vector<uchar> stripe(int size, int block, int bit, int base, bool inverse) {
   std::vector<uchar> line(static_cast<size_t>(size));
   for (int i = 0; i < size; ++i) {
-    const bool lit = (gray_bit(i, bit) ^ (bit > base ? gray_bit(i, base) : 0)) != 0;
+    const int label = i / block;
+    const bool lit = (gray_bit(label, bit) ^ (bit > base ? gray_bit(label, base) : 0)) != 0;
     line[static_cast<size_t>(i)] = lit != inverse ? 255 : 0;
   }
   return line;
@@ -89,6 +90,8 @@ Status check(PatternCode code, const CodeOptions& options) {
       !(rises(options.response->red) && rises(options.response->green) && rises(options.response->blue)))
     return error(
         "response: expected curves of at least 2 numbers that never fall and end above their start.");
+  if (code == PatternCode::gray && !within(options.step_px, 1, k_max_step_px))
+    return error("expected narrowest stripes of 1 to {} pixels, found {}.", k_max_step_px, options.step_px);
   if (code == PatternCode::exclusive_or && options.base_stripe_px != 2 && options.base_stripe_px != 4 &&
       options.base_stripe_px != 8)
     return error("expected stripes of 2, 4 or 8 pixels, found {}.", options.base_stripe_px);
@@ -108,6 +111,10 @@ CodeOptions used(PatternCode code, const CodeOptions& options) {
   }
   if (code == PatternCode::exclusive_or) kept.base_stripe_px = options.base_stripe_px;
   if (code != PatternCode::phase) kept.inverses = options.inverses;
+  if (code == PatternCode::gray) {
+    kept.step_px = options.step_px;
+    kept.axes = options.axes;
+  }
   return kept;
 }
 
@@ -120,15 +127,18 @@ Result<Patterns> Patterns::create(PatternCode code, int width, int height, const
   return Patterns{code, width, height, used(code, options)};
 }
 
-int Patterns::lowest_bit() const {
-  if (code != PatternCode::phase) return 0;
+int Patterns::block_px() const {
+  if (code != PatternCode::phase) return options.step_px;
   // Labels of at most half a wave: their centres identify the wave with a margin of a quarter.
   const int half = std::bit_width(static_cast<unsigned>(options.period_px / 2)) - 1;
-  return std::min(half, bits_for(std::min(width, height)) - 1);
+  return 1 << std::min(half, bits_for(std::min(width, height)) - 1);
 }
 
-int Patterns::column_bits() const { return bits_for(width) - lowest_bit(); }
-int Patterns::row_bits() const { return bits_for(height) - lowest_bit(); }
+int Patterns::lowest_bit() const { return std::bit_width(static_cast<unsigned>(block_px())) - 1; }
+int Patterns::column_bits() const { return bits_for(labels_on(width, block_px())); }
+int Patterns::row_bits() const {
+  return options.axes == CodeAxes::columns ? 0 : bits_for(labels_on(height, block_px()));
+}
 
 int Patterns::base_bit() const {
   if (code != PatternCode::exclusive_or) return 32;
@@ -137,7 +147,7 @@ int Patterns::base_bit() const {
 
 int Patterns::widest_stripe_px() const {
   return code == PatternCode::exclusive_or ? options.base_stripe_px
-                                           : 1 << (bits_for(std::max(width, height)) - 1);
+                                           : block_px() << (std::max(column_bits(), row_bits()) - 1);
 }
 
 std::vector<PatternGroup> Patterns::groups() const {
@@ -161,9 +171,9 @@ cv::Mat Patterns::image(int index) const {
   const bool inverse = index % images_of_bit() == 1;
   const int bit = index / images_of_bit();
   if (bit < column_bits())
-    return across(stripe(width, lowest_bit() + column_bits() - 1 - bit, base_bit(), inverse), width, height);
+    return across(stripe(width, block_px(), column_bits() - 1 - bit, base_bit(), inverse), width, height);
   const int row_bit = bit - column_bits();
-  return down(stripe(height, lowest_bit() + row_bits() - 1 - row_bit, base_bit(), inverse), width, height);
+  return down(stripe(height, block_px(), row_bits() - 1 - row_bit, base_bit(), inverse), width, height);
 }
 
 Result<Patterns> linearised(const Patterns& patterns,
@@ -182,6 +192,10 @@ Result<Patterns> linearised(const Patterns& patterns,
                joined_names(names, "no projector"));
 }
 
+int bits_for(int labels) { return static_cast<int>(std::bit_width(static_cast<unsigned>(labels - 1))); }
+
+int labels_on(int size, int block) { return (size + block - 1) / block; }
+
 std::string image_name(int index) { return fmt::format("{:03d}.png", index); }
 
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path) {
@@ -199,6 +213,8 @@ Status save_patterns(const Patterns& patterns, const std::filesystem::path& path
   }
   if (patterns.code == PatternCode::exclusive_or) json["base_stripe_px"] = patterns.options.base_stripe_px;
   if (!patterns.options.inverses) json["inverses"] = false;
+  if (patterns.options.step_px != 1) json["step_px"] = patterns.options.step_px;
+  if (patterns.options.axes != CodeAxes::both) json["axes"] = k_code_axes.text(patterns.options.axes);
   return write_file(path, json_text(json, 2) + "\n");
 }
 
@@ -209,13 +225,15 @@ CodeOptions read_code_options(const ConfigNode& node) {
   if (const auto gamma = node.find("gamma")) options.gamma = gamma->positive();
   if (const auto stripe = node.find("base_stripe_px")) options.base_stripe_px = stripe->integer();
   if (const auto inverses = node.find("inverses")) options.inverses = inverses->boolean();
+  if (const auto step = node.find("step_px")) options.step_px = step->integer();
+  if (const auto axes = node.find("axes")) options.axes = k_code_axes.read(*axes);
   return options;
 }
 
 std::set<std::string> code_option_keys(PatternCode code) {
   if (code == PatternCode::phase) return {"period_px", "steps", "gamma", "response"};
   if (code == PatternCode::exclusive_or) return {"base_stripe_px", "inverses"};
-  return {"inverses"};
+  return {"inverses", "step_px", "axes"};
 }
 
 Result<Patterns> load_patterns(const std::filesystem::path& path) {

@@ -19,6 +19,10 @@ enum class PatternCode { gray, phase, exclusive_or };
 inline constexpr EnumNames<PatternCode, 3> k_pattern_codes{{"gray", "phase", "xor"}};
 inline std::string to_text(PatternCode code) { return k_pattern_codes.text(code); }
 
+/// The axes of the projector that a series names.
+enum class CodeAxes { both, columns };
+inline constexpr EnumNames<CodeAxes, 2> k_code_axes{{"both", "columns"}};
+
 /// Images that follow each other and together illuminate every pixel alike.
 struct PatternGroup {
   int first = 0;
@@ -52,6 +56,11 @@ struct CodeOptions {
   /// as many images, for rigs that are almost known (rig check), but gives three times the noise variance,
   /// and light that changes during the capture is not detected.
   bool inverses = true;
+  /// gray: width of the narrowest stripes, projector pixels, 1 to 16. Labels are that wide; more leaves out
+  /// the finest bits, for projectors or cameras that do not resolve them.
+  int step_px = 1;
+  /// gray: `columns` leaves out the rows. A calibrated rig can scan with that; a solve needs both.
+  CodeAxes axes = CodeAxes::both;
   bool operator==(const CodeOptions&) const = default;
 };
 
@@ -74,11 +83,12 @@ struct Patterns {
   /// Patterns of a code for a size of 2 to 16384 pixels a side; options out of range are an error.
   static Result<Patterns> create(PatternCode code, int width, int height, const CodeOptions& options = {});
 
-  /// Number of finest bits that are not shown: labels from pairs alone are 2^this pixels wide. 0 except for
-  /// phase.
+  /// Width of the labels that pairs alone give, projector pixels: 1, except for phase and for gray's step_px.
+  int block_px() const;
+  /// Number of finest bits that are not shown: floor(log2(block_px())).
   int lowest_bit() const;
-  int column_bits() const;  ///< bits shown for the columns: ceil(log2(width)) - lowest_bit()
-  int row_bits() const;     ///< bits shown for the rows
+  int column_bits() const;  ///< bits shown for the columns: ceil(log2(number of labels))
+  int row_bits() const;     ///< bits shown for the rows; 0 where they are left out
   /// xor: the bit that all coarser ones are combined with; other codes: one more than the last bit.
   int base_bit() const;
   /// Width of the widest stripes of the pairs.
@@ -111,16 +121,21 @@ Result<Patterns> linearised(const Patterns& patterns,
 /// Absent keys keep their defaults. Patterns::create checks their range.
 CodeOptions read_code_options(const ConfigNode& node);
 /// The keys that a code has: phase "period_px", "steps", "gamma" or "response"; xor "base_stripe_px"; gray
-/// and xor "inverses".
+/// and xor "inverses"; gray "step_px" and "axes".
 std::set<std::string> code_option_keys(PatternCode code);
+
+/// Number of bits that name `labels` labels.
+int bits_for(int labels);
+/// Number of labels of `block` pixels on an axis of `size` pixels.
+int labels_on(int size, int block);
 
 /// The name of an image's file: `000.png` and so on.
 std::string image_name(int index);
 
 /// Writes patterns.json: {"schema": "limn.patterns/1", "code": "gray", "size": [width, height], "pictures":
 /// 44}; the images are 000.png … in the order above. phase adds "period_px", "steps" and "gamma" (or
-/// "response": {"red", "green", "blue"}), xor "base_stripe_px", gray and xor "inverses"; absent keys have
-/// their defaults.
+/// "response": {"red", "green", "blue"}), xor "base_stripe_px", gray and xor "inverses", gray "step_px" and
+/// "axes"; absent keys have their defaults.
 Status save_patterns(const Patterns& patterns, const std::filesystem::path& path);
 Result<Patterns> load_patterns(const std::filesystem::path& path);
 

@@ -8,7 +8,7 @@
 namespace limn::calib {
 namespace {
 
-constexpr float k_nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float k_no_label = std::numeric_limits<float>::quiet_NaN();
 // Camera pixels between two edges; over more, a line does not describe the surface.
 constexpr int k_longest = 64;
 
@@ -135,8 +135,8 @@ const cv::Mat& AxisReading::at_edge(int edge) const {
 AxisLabels::AxisLabels(int rows, int cols)
     : low(rows, cols, CV_16S, cv::Scalar(0)),
       end(rows, cols, CV_16S, cv::Scalar(0)),
-      px(rows, cols, CV_32F, cv::Scalar(k_nan)),
-      variance(rows, cols, CV_32F, cv::Scalar(k_nan)) {}
+      px(rows, cols, CV_32F, cv::Scalar(k_no_label)),
+      variance(rows, cols, CV_32F, cv::Scalar(k_no_label)) {}
 
 void refine_between_edges(const AxisReading& reading,
                           const DifferenceNoise& noise,

@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "calib/judge/lens_uncertainty.h"
 #include "calib/judge/uncertainty.h"
 #include "core/median.h"
 
@@ -93,6 +94,23 @@ std::vector<double> held_out_errors_mm(const Observations& observations, const C
   return p95;
 }
 
+// The verdict on cameras alone, from the held-out corners and from how well the lenses are determined.
+void judge_cameras(const Observed& observed, const Solution& solution, Assessment* assessment) {
+  double worst = 0;
+  for (size_t i = 0; i < solution.rig.cameras.size(); ++i) {
+    assessment->lens_stddev_px.push_back(lens_stddev_px(solution, i));
+    worst = std::max(worst, assessment->lens_stddev_px.back());
+  }
+  assessment->normalised_residuals = normalised_residuals(observed.observations, solution, {});
+  assessment->faults = faults(observed, solution, assessment->devices, assessment->held_out);
+  const double px = assessment->held_out.rms_px;
+  const Severity severity = heaviest(assessment->faults);
+  if (px <= k_good_px && worst <= k_good_lens_px && severity == Severity::note)
+    assessment->verdict = Verdict::good;
+  else if (px <= k_usable_px && worst <= k_usable_lens_px && severity != Severity::reject)
+    assessment->verdict = Verdict::usable;
+}
+
 }  // namespace
 
 std::string to_text(Verdict verdict) {
@@ -107,6 +125,11 @@ std::string to_text(Verdict verdict) {
   return "reject";
 }
 
+double Assessment::worst_predicted_mm() const {
+  return predicted_error_mm.empty() ? std::numeric_limits<double>::infinity()
+                                    : *std::max_element(predicted_error_mm.begin(), predicted_error_mm.end());
+}
+
 void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
   assessment->faults.insert(assessment->faults.end(), faults.begin(), faults.end());
   const Severity severity = heaviest(faults);
@@ -119,6 +142,10 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
   Assessment assessment;
   assessment.held_out = std::move(held_out);
   assessment.devices = device_qualities(observations, solution);
+  if (observations.projectors.empty()) {
+    judge_cameras(observed, solution, &assessment);
+    return assessment;
+  }
   const Uncertainty uncertainty = estimated_uncertainty(observations, solution, assessment.held_out.rigs);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
   assessment.normalised_residuals =
@@ -140,8 +167,7 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
   assessment.decoded_of_contrasted = contrasted > 0 ? decoded / contrasted : 0;
   assessment.faults = faults(observed, solution, assessment.devices, assessment.held_out);
   const double px = assessment.held_out.rms_px;
-  const double mm =
-      *std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
+  const double mm = assessment.worst_predicted_mm();
   const double on_boards_mm =
       *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
   const bool extrapolates = mm > std::max(k_fine_mm, k_beyond_boards * on_boards_mm);

@@ -34,6 +34,10 @@ struct Assessment {
   /// turned, by the estimated covariance (calib/judge/uncertainty.h). Predicted: the larger of the rig's
   /// share of the first and of the second.
   std::vector<double> held_out_error_mm, propagated_error_mm, predicted_error_mm;
+  /// Without projectors, one for each camera: the standard deviation (px, both axes) of where the lens puts a
+  /// direction, over nine tenths of its image's places, turned so that the mean shift is 0; infinite where
+  /// the solve does not determine the lens. Empty with projectors.
+  std::vector<double> lens_stddev_px = {};
   std::vector<ErrorMap> error_maps;  ///< one for each projector, over the volume shared with camera 0
   double decoded_share = 0;          ///< share of illuminated pixels
   double decoded_of_contrasted = 0;  ///< share of all pixels that white makes brighter than black
@@ -41,6 +45,9 @@ struct Assessment {
   std::vector<EpipolarResidual> epipolar;    ///< over decoded pixels of the whole image, on the board or not
   NormalisedResiduals normalised_residuals;  ///< whether the stated standard deviations are true
   std::vector<Fault> faults;
+
+  /// The largest predicted error; infinite without projectors.
+  double worst_predicted_mm() const;
 };
 
 /// Limits of the verdict. good: a part's edge lands within a pixel and a millimetre wherever the board was;
@@ -48,6 +55,8 @@ struct Assessment {
 /// usable: errors that a person at arm's length does not mind.
 constexpr double k_good_px = 0.5, k_good_mm = 1.0;
 constexpr double k_usable_px = 1.5, k_usable_mm = 3.0;
+/// Cameras alone: limits of lens_stddev_px, instead of those in mm.
+constexpr double k_good_lens_px = 0.3, k_usable_lens_px = 1.0;
 /// Not good either: a predicted error that is many times the error on the boards, because the boards then say
 /// little about the places between and beyond them (all parallel, all in the middle). Sound captures have 2
 /// to 3 times, ill-posed ones over 10 times. Predicted errors below a quarter of a millimetre are fine

@@ -240,7 +240,7 @@ std::string reason(const Assessment& assessment, double mm) {
   if (!(assessment.held_out.rms_px <= px_limit))
     reasons.push_back(fmt::format("the held-out error is {:.2f} px (at most {} for {})",
                                   assessment.held_out.rms_px, px_limit, better));
-  if (!(mm <= mm_limit))
+  if (!(mm <= mm_limit) && assessment.lens_stddev_px.empty())
     reasons.push_back(fmt::format("the predicted error is above {} mm, the limit of {}", mm_limit, better));
   std::vector<std::string> names;
   for (const Fault& fault : assessment.faults) {
@@ -249,14 +249,35 @@ std::string reason(const Assessment& assessment, double mm) {
     if (fault.severity != Severity::note && !is_named) names.push_back(name);
   }
   if (!names.empty()) reasons.push_back("faults were found: " + joined(names));
-  const double shown =
-      *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
+  const auto& on_boards = assessment.held_out_error_mm;
+  const double shown = on_boards.empty() ? mm : *std::max_element(on_boards.begin(), on_boards.end());
   if (mm <= mm_limit && mm > std::max(k_fine_mm, k_beyond_boards * shown))
     reasons.push_back("the boards do not determine the accuracy between and beyond them");
   return reasons.empty() ? "" : "Why not better: " + joined(reasons) + ".";
 }
 
+// The verdict on cameras alone.
+std::string camera_words(const Observations& observations, const Assessment& assessment) {
+  const auto& lenses = assessment.lens_stddev_px;
+  const auto worst = std::max_element(lenses.begin(), lenses.end());
+  std::string text = fmt::format(
+      "{}: held-out error (corners of poses that the solve has not used) {:.2f} px; the lens of {} is known "
+      "to "
+      "{:.2f} px (standard deviation over its image)",
+      to_text(assessment.verdict), assessment.held_out.rms_px,
+      observations.cameras[static_cast<size_t>(worst - lenses.begin())].name, *worst);
+  if (assessment.verdict == Verdict::good) return text + ".";
+  const bool reject = assessment.verdict == Verdict::reject;
+  const double limit = reject ? k_usable_lens_px : k_good_lens_px;
+  if (!(*worst <= limit))
+    text += fmt::format("; at most {} px is {}: add tilted poses that fill the image's corners", limit,
+                        reject ? "usable" : "good");
+  const std::string why = reason(assessment, assessment.worst_predicted_mm());
+  return text + "." + (why.empty() ? "" : " " + why);
+}
+
 std::string verdict_words(const Observations& observations, const Assessment& assessment) {
+  if (observations.projectors.empty()) return camera_words(observations, assessment);
   const auto worst =
       std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
   const auto projector = static_cast<size_t>(worst - assessment.predicted_error_mm.begin());

@@ -11,14 +11,16 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json devices_json(const std::vector<DeviceQuality>& devices) {
+Json devices_json(const Assessment& assessment) {
   Json list = Json::array();
-  for (const DeviceQuality& d : devices)
+  for (const DeviceQuality& d : assessment.devices)
     list.push_back({{"name", d.name},
                     {"rms_px", rounded(d.rms_px)},
                     {"points", d.points},
                     {"outliers", d.outliers},
                     {"coverage", rounded(d.coverage)}});
+  for (size_t i = 0; i < assessment.lens_stddev_px.size(); ++i)
+    list[i]["lens_stddev_px"] = rounded(assessment.lens_stddev_px[i]);
   return list;
 }
 
@@ -66,7 +68,7 @@ Json by_projector(const Report& report, const std::vector<double>& errors) {
 Json error_json(const Report& report) {
   const Assessment& a = report.assessment;
   return {
-      {"p95", rounded(*std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end()))},
+      {"p95", rounded(a.worst_predicted_mm())},
       {"per_projector", by_projector(report, a.predicted_error_mm)},
       {"held_out", by_projector(report, a.held_out_error_mm)},
       {"propagated", by_projector(report, a.propagated_error_mm)},
@@ -154,7 +156,7 @@ std::string report_json(const Report& report) {
                      {"verdict", to_text(a.verdict)},
                      {"words", report.explanation.verdict},
                      {"advice", report.explanation.advice},
-                     {"devices", devices_json(a.devices)},
+                     {"devices", devices_json(a)},
                      {"held_out", held_out_json(a.held_out)},
                      {"lens_models", lenses_json(report)},
                      {"predicted_error_mm", error_json(report)},

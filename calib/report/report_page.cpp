@@ -35,8 +35,10 @@ std::string tile(const std::string& value, const std::string& unit, const std::s
                      escaped(what));
 }
 
-double worst_mm(const Assessment& a) {
-  return *std::max_element(a.predicted_error_mm.begin(), a.predicted_error_mm.end());
+bool has_projectors(const Report& report) { return !report.observed.observations.projectors.empty(); }
+
+double worst_lens_px(const Assessment& a) {
+  return a.lens_stddev_px.empty() ? 0 : *std::max_element(a.lens_stddev_px.begin(), a.lens_stddev_px.end());
 }
 
 // The largest residual of all pairs, on the board.
@@ -56,9 +58,15 @@ std::string header(const Report& report) {
       fmt::format("<h1>Calibration <span class='{0}'>{0}</span></h1>\n<p class='lead'>{1}</p>\n", verdict,
                   escaped(words));
   html += fmt::format("<p class='soft'>{}</p>\n<div class='tiles'>\n", escaped(report.made_at));
-  html += tile(fmt::format("{:.2f}", worst_mm(a)), "mm", "predicted error (95 %), worst projector");
+  if (has_projectors(report))
+    html +=
+        tile(fmt::format("{:.2f}", a.worst_predicted_mm()), "mm", "predicted error (95 %), worst projector");
+  else
+    html += tile(fmt::format("{:.2f}", worst_lens_px(a)), "px",
+                 "uncertainty of the worst camera's lens (standard deviation)");
   html += tile(fmt::format("{:.2f}", a.held_out.rms_px), "px",
                "held-out error: on poses that the solve has not used");
+  if (!has_projectors(report)) return html + "</div>\n";
   html += tile(fmt::format("{:.2f}", epipolar_px(a)), "px", "epipolar residual on the board");
   html += tile(fmt::format("{:.0f}", 100 * a.decoded_share), "%", "of illuminated pixels decoded");
   return html + "</div>\n";
@@ -88,7 +96,7 @@ std::string error_maps_html(const Report& report) {
   for (const ErrorMap& map : report.assessment.error_maps) most = std::max(most, map.worst_mm());
   // Outside the volume of the boards the error may grow without limit; the colours cover the rest.
   constexpr double k_brightest = 4;  // times the predicted error
-  if (const double predicted = worst_mm(report.assessment); std::isfinite(predicted))
+  if (const double predicted = report.assessment.worst_predicted_mm(); std::isfinite(predicted))
     most = std::min(most, k_brightest * predicted);
   std::string html;
   for (const ErrorMap& map : report.assessment.error_maps) {
@@ -306,7 +314,7 @@ std::string history_html(const Report& report) {
                        ? device_moves(*report.history.rig, report.observed.observations, report.solution)
                        : std::vector<DeviceMove>();
   rows.push_back({report.made_at + " (this one)", to_text(a.verdict),
-                  fmt::format("{:.3f}", a.held_out.rms_px), mm(worst_mm(a)), moved_text(now)});
+                  fmt::format("{:.3f}", a.held_out.rms_px), mm(a.worst_predicted_mm()), moved_text(now)});
   held_out.push_back(a.held_out.rms_px);
   std::reverse(rows.begin(), rows.end());
   return html_figure(sparkline(held_out), "Held-out error, px RMS,", "oldest to newest") +

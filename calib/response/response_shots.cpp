@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 using Role = ResponseImage::Role;
 
 constexpr double k_least_contrast = 10;  // levels, white over black: below it there is more noise than light
-constexpr size_t k_least_lit = 400;      // number of pixels' channels: a patch of 20 x 20
+constexpr size_t k_least_lit_pixels = 400;  // number of pixels' channels: a patch of 20 x 20
 
 fs::path folder_of(const CaptureSet& captures, int projector, int camera) {
   return captures.folder / "response" / captures.projectors[static_cast<size_t>(projector)].name /
@@ -73,7 +73,7 @@ Error dark(const ResponseShots& shots, size_t lit) {
   return error(
       "{}: expected images where white is at least {} levels brighter than black in {} places, found {}. All "
       "is dark: is the projector on, does the camera see its light? Expose longer.",
-      shots.folder.string(), k_least_contrast, k_least_lit, lit);
+      shots.folder.string(), k_least_contrast, k_least_lit_pixels, lit);
 }
 
 Error saturated(const ResponseShots& shots, size_t unclipped, size_t lit) {
@@ -165,8 +165,8 @@ Result<ResponseSamples> sampled(const ResponseShots& shots, size_t most) {
   if (saturated_black > black.total() * black.elemSize() / 2)
     return saturated(shots, black.total() * black.elemSize() - saturated_black,
                      black.total() * black.elemSize());
-  if (lit_at_all < k_least_lit) return dark(shots, lit_at_all);
-  if (lit.size() < k_least_lit) return saturated(shots, lit.size(), lit_at_all);
+  if (lit_at_all < k_least_lit_pixels) return dark(shots, lit_at_all);
+  if (lit.size() < k_least_lit_pixels) return saturated(shots, lit.size(), lit_at_all);
   ResponseSamples samples{shots.camera, shots.projector, std::min(most, lit.size()), {}};
   for (size_t k = 0; k < samples.count; ++k) {
     const size_t offset = lit[k * lit.size() / samples.count];

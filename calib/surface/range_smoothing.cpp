@@ -80,12 +80,12 @@ class Window {
   std::vector<Neighbour> found_;
 };
 
-struct Fit {
+struct QuadricFit {
   Six coefficients = Six::Zero();
   double variance = 0;  // variance of the centre, if the noise were independent and as stated
 };
 
-std::optional<Fit> fitted(const std::vector<Neighbour>& around) {
+std::optional<QuadricFit> fitted(const std::vector<Neighbour>& around) {
   SixSix a = SixSix::Zero();
   Six b = Six::Zero();
   for (const Neighbour& n : around) {
@@ -95,14 +95,16 @@ std::optional<Fit> fitted(const std::vector<Neighbour>& around) {
   }
   const Eigen::LLT<SixSix> factored(a);
   if (factored.info() != Eigen::Success) return std::nullopt;
-  Fit fit;
+  QuadricFit fit;
   fit.coefficients = factored.solve(b);
   fit.variance = factored.solve(Six::Unit(0))[0];
   if (!fit.coefficients.allFinite() || !(fit.variance > 0)) return std::nullopt;
   return fit;
 }
 
-double residual(const Neighbour& n, const Fit& fit) { return n.q - terms(n.dx, n.dy).dot(fit.coefficients); }
+double residual(const Neighbour& n, const QuadricFit& fit) {
+  return n.q - terms(n.dx, n.dy).dot(fit.coefficients);
+}
 
 // The size of the noise relative to the stated one, by position, and its correlation between neighbouring
 // pixels.
@@ -227,7 +229,7 @@ Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half
 }
 
 // Repeats the fit with the outliers of the first one down-weighted (Cauchy).
-std::optional<Fit> robustly_fitted(std::vector<Neighbour> around, double scale) {
+std::optional<QuadricFit> robustly_fitted(std::vector<Neighbour> around, double scale) {
   auto fit = fitted(around);
   if (!fit) return fit;
   constexpr double k_gentle = 2.5;  // standard deviations at which a neighbour counts half

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "calib/surface/range_smoothing.h"
 #include "calib/surface/triangulate.h"
@@ -29,7 +30,8 @@ constexpr double k_conflict_sigmas = 5;
 constexpr double k_conflict_m = 0.5e-3;  // if they also differ by more than in a good rig
 // Standard deviations of a step between neighbours that noise may explain.
 constexpr double k_step_sigmas = 4;
-constexpr int k_least_piece = 30;  // pixels; smaller islands are wrong codes or useless
+constexpr double k_unknown_row_px = 1e3;  // standard deviation of a row that the code does not show
+constexpr int k_least_piece = 30;         // pixels; smaller islands are wrong codes or useless
 // Directions of a projector's pixels from a coarse map; accurate enough to start a triangulation.
 class CoarseRays {
  public:
@@ -65,6 +67,44 @@ struct Reading {
   double range = 0, variance = 0;
   float epipolar_px = k_no_range;
 };
+
+// The row of a projector's column on the camera ray's image in the projector: between two depths at which the
+// ray's pixels lie on both sides of the column, by bisection over the inverse depth. nullopt where the ray
+// does not reach the column within the distances.
+std::optional<double> row_on_ray(const Imager& projector,
+                                 const Ray& camera_ray,
+                                 double column,
+                                 const RangeOptions& options) {
+  constexpr double k_nearest_m = 0.05;
+  constexpr int k_steps = 24, k_bisections = 40;
+  const double most = 1 / std::max(k_nearest_m, options.nearest_m), least = 1 / options.farthest_m;
+  const auto seen = [&](double inverse) {
+    return projector.project(camera_ray.p_origin + camera_ray.d / inverse);
+  };
+  double before = 0;
+  std::optional<Vector2d> px_before;
+  for (int i = 0; i <= k_steps; ++i) {
+    double far = before, near = least + (most - least) * i / k_steps;
+    const auto px = seen(near);
+    const bool crosses = px && px_before && (px->x() > column) != (px_before->x() > column);
+    before = near;
+    if (!crosses) {
+      px_before = px;
+      continue;
+    }
+    const bool rises = px->x() > column;
+    for (int k = 0; k < k_bisections; ++k) {
+      const double middle = (far + near) / 2;
+      const auto at = seen(middle);
+      if (!at) return std::nullopt;
+      ((at->x() > column) == rises ? near : far) = middle;
+    }
+    const auto found = seen(near);
+    if (!found || found->y() < -0.5 || found->y() > projector.height - 0.5) return std::nullopt;
+    return found->y();
+  }
+  return std::nullopt;
+}
 
 Reading read_pixel(const Imager& camera,
                    const Imager& projector,
@@ -120,9 +160,14 @@ std::vector<Reading> read_all(const RangeView& view, const DecodedBy& seen, cons
         if (std::isnan(label[0]) || !d.allFinite()) continue;
         const Ray ray{world_from_camera.translation,
                       world_from_camera.rotation * d.cast<double>().normalized()};
+        MeasuredPixel shown{{label[0], label[1]}, {variance[0], variance[1]}};
+        if (std::isnan(label[1])) {
+          const auto row = row_on_ray(*seen.projector, ray, label[0], options);
+          if (!row) continue;
+          shown = {{label[0], *row}, {variance[0], k_unknown_row_px * k_unknown_row_px}};
+        }
         readings[flat(px.size(), x, y)] =
-            read_pixel(view.camera, *seen.projector, projector_rays, ray, {x, y},
-                       {{label[0], label[1]}, {variance[0], variance[1]}}, options);
+            read_pixel(view.camera, *seen.projector, projector_rays, ray, {x, y}, shown, options);
       }
     }
   });

@@ -130,6 +130,36 @@ TEST_F(DoorScan, IsWithinATenthOfAMillimetreOfTheClay) {
   }
 }
 
+// The patterns of the columns alone, under another program's names, and no board: as SLStudio and others
+// capture.
+TEST_F(DoorScan, OfImportedColumnsAloneIsTheSameSurface) {
+  const fs::path own = test::test_folder();
+  const fs::path captured = out_ / "scan/captures/pose00/camera0";
+  fs::create_directories(own / "photos/scene_1");
+  constexpr int k_columns = 22, k_white = 42;  // 11 bits with inverses; white and black are the last of 44
+  for (int i = 0; i < k_columns; ++i)
+    fs::create_symlink(captured / fmt::format("{:03}.png", i),
+                       own / fmt::format("photos/scene_1/img{}.png", i + 2));
+  for (int i = 0; i < 2; ++i)
+    fs::create_symlink(captured / fmt::format("{:03}.png", k_white + i),
+                       own / fmt::format("photos/scene_1/img{}.png", i));
+  ScanCommand command;
+  command.captures = own / "photos";
+  command.rig = out_ / "rig";
+  command.out = own / "scan";
+  command.poses = {"scene_*"};
+  command.foreign = {.import_format = wizard::ImportFormat::opencv_gray, .projector = "1280x800"};
+  const Status done = run_scan(command);
+  ASSERT_TRUE(done.ok()) << done.message();
+  const auto surface = scene::load_ply(own / "scan/points.ply");
+  ASSERT_TRUE(surface.ok()) << surface.message();
+  const Errors e = errors_on_clay(*surface, *world_, 23);
+  printf("[ scan     ] columns alone: %.3f mm RMS off the clay\n", e.rms_mm);
+  EXPECT_GT(e.count, 5000);
+  EXPECT_LT(e.rms_mm, 0.3);
+  EXPECT_LT(std::abs(e.mean_mm), 0.05);
+}
+
 TEST_F(DoorScan, ReportsItsPointsAndDrawsThem) {
   const auto json = test::read_json(out_ / "scan/scan.json");
   EXPECT_GT(json["points"], 250000);

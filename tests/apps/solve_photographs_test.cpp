@@ -31,11 +31,11 @@ constexpr double k_max_held_out_px = 0.20;
 
 wizard::SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {
   wizard::SolveCommandOptions options{.captures = data, .out = out};
-  options.import_format = wizard::ImportFormat::opencv_gray;
-  options.projector = "1024x768";
-  options.board = "chessboard:9x7:75mm";
-  options.poses = "capture_*";
-  options.shots = "graycode_*.png";
+  options.foreign.import_format = wizard::ImportFormat::opencv_gray;
+  options.foreign.projector = "1024x768";
+  options.foreign.board = "chessboard:9x7:75mm";
+  options.foreign.poses = "capture_*";
+  options.foreign.shots = "graycode_*.png";
   return options;
 }
 
@@ -264,6 +264,45 @@ TEST(SolvePhotographs, FiveRealPosesHoldOutByTheReportAndByAnIndependentJudge) {
   EXPECT_LE(worst_cells, k_max_worst_cells_px);
   EXPECT_LE(corners.rms(), k_max_corners_px);
   EXPECT_LE(worst_corners, k_max_worst_corners_px);
+}
+
+// Links the photographs of each pose under another order and other names: order[i] is OpenCV's index of image
+// i.
+void link_in_order(const fs::path& data,
+                   const std::vector<int>& order,
+                   const std::string& name,
+                   const fs::path& to) {
+  fs::create_directories(to);
+  for (int pose = 0; pose < 5; ++pose) {
+    for (size_t i = 0; i < order.size(); ++i)
+      fs::create_symlink(data / fmt::format("capture_{}", pose) / fmt::format("graycode_{:02}.png", order[i]),
+                         to / fmt::format(fmt::runtime(name), pose, i));
+  }
+}
+
+double held_out_of(const fs::path& photos, const fs::path& out) {
+  wizard::SolveCommandOptions options = five_poses(photos, out);
+  options.foreign.shots = "*";
+  const Status status = run_solve(options);
+  EXPECT_TRUE(status.ok()) << status.message();
+  return status.ok() ? test::read_json(out / "report.json")["held_out"]["rms_px"].get<double>() : 1e9;
+}
+
+TEST(SolvePhotographs, InOtherOrdersHoldOutAlike) {
+  const auto data = test::real_data("graycode");
+  if (!data) GTEST_SKIP() << "no photographs: graycode";
+  const fs::path folder = test::test_folder();
+  std::vector<int> everything = {40, 41}, without_white, single;  // rows, columns; inverses first
+  for (int i = 20; i < 60; ++i) everything.push_back((i % 40) ^ 1);
+  for (int i = 0; i < 40; ++i) without_white.push_back(i);
+  for (int i = 0; i < 40; i += 2) single.push_back(i);
+  single.insert(single.end(), {41, 40});
+  link_in_order(*data, everything, "p{}_{}.png", folder / "everything");
+  link_in_order(*data, without_white, "p{}_{:03}.png", folder / "without_white");
+  link_in_order(*data, single, "{1}-p{0}.png", folder / "single");
+  EXPECT_NEAR(held_out_of(folder / "everything", folder / "rig0"), 0.173, 0.005);
+  EXPECT_NEAR(held_out_of(folder / "without_white", folder / "rig1"), 0.173, 0.02);
+  EXPECT_LT(held_out_of(folder / "single", folder / "rig2"), 0.35);
 }
 
 }  // namespace

@@ -460,22 +460,94 @@ TEST(SolveCommand, SaysThatNoBoardIsVisible) {
   EXPECT_FALSE(fs::exists(folder / "rig"));
 }
 
+// The captures in one folder under another program's names: white and black first, then rows, then columns,
+// each inverse before its pattern, numbers without zeros.
+void store_as_others_do(const fs::path& folder, int poses) {
+  ASSERT_TRUE(make_folder(folder).ok());
+  constexpr int k_bits = 8;  // of columns and of rows
+  std::vector<int> order = {4 * k_bits, 4 * k_bits + 1};
+  for (const int first : {2 * k_bits, 0}) {
+    for (int i = first; i < first + 2 * k_bits; ++i) order.push_back(i ^ 1);
+  }
+  for (int pose = 0; pose < poses; ++pose) {
+    for (size_t i = 0; i < order.size(); ++i)
+      fs::create_symlink(
+          captured() / fmt::format("pose{:02}", pose) / "camera0" / calib::image_name(order[i]),
+          folder / fmt::format("board{}_cam0_{}.png", pose, i));
+  }
+}
+
+TEST(SolveCommand, ImportsOtherOrdersWithTheSameResult) {
+  const fs::path out = test_folder();
+  wizard::SolveCommandOptions own{.captures = captured(), .out = out / "own"};
+  own.camera_model = own.projector_model = "LENSMODEL_OPENCV4";
+  ASSERT_TRUE(run_solve(own).ok());
+  store_as_others_do(out / "photos", 6);
+  wizard::SolveCommandOptions foreign = own;
+  foreign.captures = out / "photos";
+  foreign.out = out / "foreign";
+  foreign.foreign = {.import_format = wizard::ImportFormat::opencv_gray,
+                     .projector = "256x192",
+                     .board = "charuco:8x6:40mm"};
+  const Status solved = run_solve(foreign);
+  ASSERT_TRUE(solved.ok()) << solved.message();
+  const auto mine = test::read_json(out / "own" / "report.json"),
+             theirs = test::read_json(out / "foreign" / "report.json");
+  EXPECT_NEAR(theirs["held_out"]["rms_px"].get<double>(), mine["held_out"]["rms_px"].get<double>(), 1e-6);
+  EXPECT_EQ(theirs["held_out"]["poses"].size(), 6U);
+  foreign.foreign.order = "columns-first";
+  const Status wrong = run_solve(foreign);
+  ASSERT_FALSE(wrong.ok());
+  EXPECT_NE(wrong.message().find("--order columns-first does not fit"), std::string::npos) << wrong.message();
+  EXPECT_EQ(wrong.message().find("mirrored"), std::string::npos) << wrong.message();
+}
+
+TEST(SolveCommand, RefusesColumnsWithoutRows) {
+  const fs::path out = test_folder();
+  wizard::SolveCommandOptions options{.captures = out / "photos", .out = out / "rig"};
+  options.foreign = {.import_format = wizard::ImportFormat::opencv_gray,
+                     .projector = "256x192",
+                     .board = "charuco:8x6:40mm"};
+  for (int pose = 0; pose < 3; ++pose) {
+    const fs::path to = options.captures / fmt::format("pose{}", pose);
+    ASSERT_TRUE(make_folder(to).ok());
+    for (int i = 0; i < 16; ++i)
+      fs::create_symlink(captured() / fmt::format("pose{:02}", pose) / "camera0" / calib::image_name(i),
+                         to / calib::image_name(i));
+  }
+  const Status status = run_solve(options);
+  ASSERT_FALSE(status.ok());
+  EXPECT_NE(status.message().find("columns of projector0 only"), std::string::npos) << status.message();
+}
+
+TEST(SolveCommand, SolvesTheCamerasOfCapturesAlone) {
+  const fs::path out = test_folder();
+  const Status status = run_solve({.captures = captured(), .out = out / "rig", .cameras_only = true});
+  ASSERT_TRUE(status.ok()) << status.message();
+  const auto rig = load_rig(out / "rig");
+  ASSERT_TRUE(rig.ok()) << rig.message();
+  EXPECT_TRUE(rig->projectors.empty());
+  EXPECT_NEAR(rig->cameras[0].lens.fx(), 800, 4);
+}
+
 TEST(SolveCommand, CallsWrongOptionsWrongUsage) {
   const fs::path folder = test_folder();
   const auto usage = [](const wizard::SolveCommandOptions& options) {
     const Status status = run_solve(options);
     return !status.ok() && status.error().wrong_usage;
   };
-  wizard::SolveCommandOptions foreign{.captures = folder, .out = folder / "rig"};
-  foreign.import_format = wizard::ImportFormat::opencv_gray;
-  EXPECT_TRUE(usage(foreign));
-  foreign.projector = "1024x768";
-  foreign.board = "chessboard:9x7";
-  EXPECT_TRUE(usage(foreign));
-  foreign.board = "chessboard:9x7:75mm";
-  EXPECT_FALSE(usage(foreign)) << "the folder's emptiness is no wrong usage";
+  wizard::SolveCommandOptions described{.captures = folder, .out = folder / "rig"};
+  described.foreign.import_format = wizard::ImportFormat::opencv_gray;
+  EXPECT_TRUE(usage(described));
+  described.foreign.projector = "1024x768";
+  described.foreign.board = "chessboard:9x7";
+  EXPECT_TRUE(usage(described));
+  described.foreign.board = "chessboard:9x7:75mm";
+  EXPECT_FALSE(usage(described)) << "the folder's emptiness is no wrong usage";
   EXPECT_TRUE(usage({.captures = folder, .out = folder / "rig", .camera_model = "LENSMODEL_NONE"}));
-  EXPECT_TRUE(usage({.captures = folder, .out = folder / "rig", .projector = "1024x768"}));
+  wizard::SolveCommandOptions own{.captures = folder, .out = folder / "rig"};
+  own.foreign.projector = "1024x768";
+  EXPECT_TRUE(usage(own));
 }
 
 }  // namespace

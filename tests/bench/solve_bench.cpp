@@ -38,11 +38,11 @@ int main(int argc, char** argv) {
     return 2;
   }
   limn::wizard::SolveCommandOptions options{.captures = argv[1], .out = argv[2]};
-  options.import_format = limn::wizard::ImportFormat::opencv_gray;
-  options.projector = "1024x768";
-  options.board = "chessboard:9x7:75mm";
-  options.poses = "capture_*";
-  options.shots = "graycode_*.png";
+  options.foreign.import_format = limn::wizard::ImportFormat::opencv_gray;
+  options.foreign.projector = "1024x768";
+  options.foreign.board = "chessboard:9x7:75mm";
+  options.foreign.poses = "capture_*";
+  options.foreign.shots = "graycode_*.png";
   const std::vector<fs::path> files = images_in(options.captures);
   // The two take turns, so that other work on the machine slows both; the fastest run of each counts.
   double reading = 1e9, solving = 1e9, held_out = 0, worst = 0;

@@ -21,8 +21,8 @@
 #include "core/log.h"
 #include "core/rig.h"
 #include "core/time_now.h"
-#include "wizard/measure/pixel_size.h"
 #include "wizard/measure/scale_bars.h"
+#include "wizard/measure/solve_cameras.h"
 
 namespace limn::wizard {
 namespace {
@@ -33,22 +33,17 @@ double seconds_since(Clock::time_point begun) {
   return std::chrono::duration<double>(Clock::now() - begun).count();
 }
 
-Result<calib::CaptureSet> foreign_captures(const SolveCommandOptions& options) {
-  if (options.projector.empty() || options.board.empty())
-    return usage_error("--import {}: needs --projector 1024x768 and --board chessboard:9x7:75mm.",
-                       k_import_formats.text(*options.import_format));
-  LIMN_TRY(const PixelSize size, parse_pixel_size(options.projector));
-  const auto board = calib::Board::parse(options.board);
-  if (!board) return usage_error("--board: {}", board.message());
-  return calib::import_opencv_gray(
-      {options.captures, size.width, size.height, *board, options.poses, options.shots, options.skip_poses});
-}
-
-Result<calib::CaptureSet> captures_of(const SolveCommandOptions& options) {
-  if (options.import_format) return foreign_captures(options);
-  if (!options.projector.empty() || !options.board.empty())
-    return usage_error("--projector and --board describe foreign captures: they need --import opencv-gray.");
-  return calib::load_captures(options.captures, options.skip_poses);
+// A projector's rows are part of what a solve finds.
+Status check_axes(const calib::CaptureSet& captures) {
+  for (size_t i = 0; i < captures.patterns.size(); ++i) {
+    if (captures.patterns[i].options.axes == calib::CodeAxes::both) continue;
+    return error(
+        "{}: the images show the columns of {} only. Without its rows neither its height nor its vertical "
+        "focal length is determined: capture the rows, too. (With a calibrated rig limn scan needs columns "
+        "alone.)",
+        captures.folder.string(), captures.projectors[i].name);
+  }
+  return {};
 }
 
 Status check_models(const SolveCommandOptions& options) {
@@ -110,7 +105,10 @@ Status measure_vignetting(const calib::CaptureSet& captures,
 Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   const auto begun = Clock::now();
   LIMN_TRY_STATUS(check_models(options));
-  LIMN_TRY(const calib::CaptureSet captures, captures_of(options));
+  if (options.cameras_only) return solve_cameras(options);
+  LIMN_TRY(const calib::CaptureSet captures,
+           captures_of(options.captures, options.skip_poses, options.foreign));
+  LIMN_TRY_STATUS(check_axes(captures));
   LIMN_TRY(const auto lengths, scale_bar_lengths(captures, options.scale_bar_lengths));
   LIMN_TRY_STATUS(calib::check_images(captures));
   LIMN_TRY(calib::MeasuredResponse response, calib::measure_response(captures));

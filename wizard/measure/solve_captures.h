@@ -6,14 +6,10 @@
 #include <vector>
 
 #include "calib/report/report.h"
-#include "core/enum_names.h"
 #include "core/result.h"
+#include "wizard/measure/foreign_options.h"
 
 namespace limn::wizard {
-
-/// How another program stores its captures.
-enum class ImportFormat { opencv_gray };
-inline constexpr EnumNames<ImportFormat, 1> k_import_formats{{"opencv-gray"}};
 
 struct SolveCommandOptions {
   std::filesystem::path captures;
@@ -22,16 +18,16 @@ struct SolveCommandOptions {
   /// Lens model of all cameras, and of all projectors; "auto": selected for each device by held-out error.
   std::string camera_model = "auto";
   std::string projector_model = "auto";
+  bool cameras_only = false;    ///< solves the cameras from photographs of the board, without projectors
+  ForeignOptions foreign = {};  ///< describes captures of another program, and photographs of cameras alone
   /// Scale bars that the cameras see, each as "apriltag_36h11:3 apriltag_36h11:7 250mm", in addition to those
   /// of capture.json.
   std::vector<std::string> scale_bar_lengths = {};
-
-  /// Captures of another program, which need the members below; absent: captures of Limn.
-  std::optional<ImportFormat> import_format = {};
-  std::string projector = {};  ///< the projector's size, "1024x768"
-  std::string board = {};      ///< "chessboard:9x7:75mm"
-  std::string poses = "pose*";
-  std::string shots = "*.png";
+};
+std::string projector = {};  ///< the projector's size, "1024x768"
+std::string board = {};      ///< "chessboard:9x7:75mm"
+std::string poses = "pose*";
+std::string shots = "*.png";
 };
 
 /// Solves captures and writes the rig folder (rig.json, .cameramodel files, report.json, report.html,
