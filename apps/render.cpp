@@ -328,12 +328,12 @@ Status run_render(const RenderOptions& options) {
   LIMN_TRY(Rig rig, load_rig(options.rig));
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene, &skipped_variants));
-  for (const scene::SkippedVariant& skipped : skipped_variants)
-    log_warning("render: {}", scene::to_text(skipped));
   if (!options.poses.empty()) LIMN_TRY_STATUS(check_posed(options.poses, skipped_variants));
   LIMN_TRY(const Frames frames, read_frames(options.frames, &rig));
   LIMN_TRY(const scene::PosedScene posed, place(options, scene, rig, frames));
   if (options.poses.empty()) LIMN_TRY_STATUS(check_placed(scene, posed, skipped_variants));
+  for (const scene::SkippedVariant& skipped : skipped_variants)
+    log_warning("render: {}", scene::to_text(skipped));
   LIMN_TRY(const Imager viewer, choose_viewer(options, scene, posed, rig));
   report_missing(scene, posed);
   report_odd(scene, rig, posed, viewer);

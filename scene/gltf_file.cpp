@@ -130,7 +130,8 @@ Result<GltfFile> GltfFile::open(const fs::path& path) {
       return file;
     }
     text = whole.substr(20, json_length);
-    const std::size_t next = 20 + (json_length + 3) / 4 * 4;
+    std::size_t next = 20 + json_length;  // some programs forget to fill up to four bytes
+    if (whole.compare(std::min(next + 4, whole.size()), 3, "BIN") != 0) next = 20 + (json_length + 3) / 4 * 4;
     if (next + 8 <= whole.size()) {
       if (u32_at(whole, next) > whole.size() - next - 8) return cut;
       file.bin_ = whole.substr(next + 8, u32_at(whole, next));
@@ -149,6 +150,8 @@ Result<GltfFile> GltfFile::open(const fs::path& path) {
 }
 
 int GltfFile::version() const {
+  // In glTF 1.0 meshes have names instead of numbers.
+  if (const auto meshes = root_->find("meshes"); meshes != root_->end() && meshes->is_object()) return 1;
   const json asset = root_->value("asset", json::object());
   const json version = asset.value("version", json("2.0"));
   return version.is_string() && version.get<std::string>().starts_with("1") ? 1 : 2;

@@ -57,7 +57,8 @@ void append(const MeshPiece& piece, const TexturePlace& place, double metres, So
       corner.position = (piece.positions[i] * static_cast<float>(metres)).array() + 0.f;
       corner.normal = piece.normals.empty() ? Eigen::Vector3f::Zero().eval() : piece.normals[i];
       corner.uv = piece.uvs.empty() ? Eigen::Vector2f::Zero().eval() : place.moved * piece.uvs[i];
-      corner.colour = piece.colours.empty() ? Eigen::Vector3f::Ones().eval() : piece.colours[i];
+      const bool has_colour = !piece.colours.empty() && piece.colours[i].allFinite();
+      corner.colour = has_colour ? piece.colours[i] : Eigen::Vector3f::Ones().eval();
       soup->corners.push_back(corner);
       if (has_tangents) soup->tangents.push_back(piece.tangents[i]);
     }
@@ -169,7 +170,7 @@ void leave_out_maps(const fs::path& path, Mesh* mesh) {
 Status check_mesh(const Soup& soup, const fs::path& path) {
   for (std::size_t c = 0; c < soup.corners.size(); ++c) {
     const Corner& corner = soup.corners[c];
-    if (corner.position.allFinite() && corner.uv.allFinite() && corner.colour.allFinite()) continue;
+    if (corner.position.allFinite() && corner.uv.allFinite()) continue;
     return error(
         "{}: triangle {}: expected finite coordinates, found NaN or infinity. Repair or export the mesh "
         "again.",
@@ -238,6 +239,7 @@ Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
   }
   LIMN_TRY(const MeshContent content, read_safely(path));
   for (const std::string& warning : content.warnings) log_warning("{}", warning);
+  if (content.pieces.empty()) return no_triangles(path);
   LIMN_TRY(const double metres, metres_of(content, path, units));
   Soup soup = soup_of(content, metres);
   if (soup.triangle_materials.empty()) return no_triangles(path);

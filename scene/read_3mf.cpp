@@ -115,8 +115,7 @@ class ThreeMfReader {
     std::string names;
     for (const std::string& left_out : left_out_) names += (names.empty() ? "" : ", ") + left_out;
     if (!names.empty())
-      content_.warnings.push_back(
-          fmt::format("{}: its {} are not shown. Export glTF for textures.", path_.string(), names));
+      content_.warnings.push_back(fmt::format("{}: its {} are not shown.", path_.string(), names));
     return std::move(content_);
   }
 
@@ -205,6 +204,7 @@ class ThreeMfReader {
     const std::string own_group = attribute(object, "pid"), own_index = attribute(object, "pindex");
     MeshPiece piece;
     bool has_colours = false;
+    if (child(mesh, "beamlattice")) left_out_.insert("beams");
     for (const xml_node& t : child(mesh, "triangles").children()) {
       if (local(t.name()) != "triangle") continue;
       const auto first = static_cast<std::uint32_t>(piece.positions.size());

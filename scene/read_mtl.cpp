@@ -17,8 +17,9 @@ namespace fs = std::filesystem;
 // Options of a map statement with the most words that follow each.
 const std::map<std::string, int>& map_options() {
   static const std::map<std::string, int> k_options = {
-      {"-blendu", 1}, {"-blendv", 1}, {"-cc", 1}, {"-clamp", 1},  {"-imfchan", 1}, {"-mm", 2},  {"-bm", 1},
-      {"-o", 3},      {"-s", 3},      {"-t", 3},  {"-texres", 1}, {"-boost", 1},   {"-type", 1}};
+      {"-blendu", 1}, {"-blendv", 1}, {"-cc", 1},         {"-clamp", 1}, {"-imfchan", 1},
+      {"-mm", 2},     {"-bm", 1},     {"-o", 3},          {"-s", 3},     {"-t", 3},
+      {"-texres", 1}, {"-boost", 1},  {"-colorspace", 1}, {"-type", 1}};
   return k_options;
 }
 

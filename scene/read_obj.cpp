@@ -1,6 +1,7 @@
 #include "scene/read_obj.h"
 
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <set>
 #include <utility>
@@ -30,6 +31,7 @@ class ObjReader {
     for (const ObjLine& line : obj_lines(text)) {
       LIMN_TRY_STATUS(read_line(line));
     }
+    LIMN_TRY_STATUS(check_indices());
     add_faces();
     return std::move(content_);
   }
@@ -37,7 +39,7 @@ class ObjReader {
  private:
   struct Face {
     std::vector<ObjCorner> corners;
-    std::size_t material = 0;
+    std::size_t material = 0, line = 0;
   };
 
   Error unreadable(const ObjLine& line, const std::string& expected) const {
@@ -87,18 +89,19 @@ class ObjReader {
     return {};
   }
 
-  // An index counts from 1, or backwards from the last entry if it is negative.
-  Result<long> index_of(const ObjLine& line, const std::string& text, std::size_t count) const {
+  // An index counts from 1, or backwards from the last entry above it if it is negative; -1: none. Whether
+  // there is such an entry is only known at the end of the file.
+  Result<long> index_of(const ObjLine& line, const std::string& text, std::size_t above) const {
     if (text.empty()) return -1L;
     const auto value = number_of_word(text);
-    const double at = !value ? -1 : *value < 0 ? static_cast<double>(count) + *value : *value - 1;
-    if (!(at >= 0 && at < static_cast<double>(count)))
-      return unreadable(line, fmt::format("indices of the {} entries above it", count));
+    const double at = !value ? -1 : *value < 0 ? static_cast<double>(above) + *value : *value - 1;
+    if (!(at >= 0 && at < 4e9))
+      return unreadable(line, fmt::format("indices from 1, or back into the {} entries above it", above));
     return static_cast<long>(at);
   }
 
   Status read_face(const ObjLine& line) {
-    Face face{{}, material_};
+    Face face{{}, material_, line.number};
     for (const std::string& word : words_of(line.rest)) {
       const auto first = std::min(word.find('/'), word.size());
       const auto second = first == word.size() ? first : std::min(word.find('/', first + 1), word.size());
@@ -116,27 +119,87 @@ class ObjReader {
     return {};
   }
 
-  Status read_materials(const std::string& names) {
-    std::vector<std::string> each = {names};  // one name with blanks, or several names
-    if (!find_named_file(path_.parent_path(), names)) each = words_of(names);
-    for (const std::string& name : each) {
-      auto file = find_named_file(path_.parent_path(), name);
-      const bool is_renamed = !file;
-      if (!file) file = find_named_file(path_.parent_path(), path_.stem().string() + ".mtl");
-      if (!file) {
-        is_library_missing_ = true;
-        content_.warnings.push_back(fmt::format(
-            "{}: expected the material file {}, found none. Its surfaces are shown grey. Copy it beside "
-            "the mesh.",
-            path_.string(), name));
-        continue;
+  // Texture coordinates and normals that the file does not hold count as absent; vertices may not be absent.
+  Status check_indices() {
+    bool is_missing = false;
+    const auto check = [&](std::size_t count, long* index) {
+      if (*index < static_cast<long>(count)) return;
+      *index = -1;
+      is_missing = true;
+    };
+    for (Face& face : faces_)
+      for (ObjCorner& corner : face.corners) {
+        if (corner.position >= static_cast<long>(positions_.size()))
+          return error("{}: line {}: expected indices of the file's {} vertices, found {}. Export it again.",
+                       path_.string(), face.line, positions_.size(), corner.position + 1);
+        check(uvs_.size(), &corner.uv);
+        check(normals_.size(), &corner.normal);
       }
-      if (file->is_other_case || is_renamed)
-        content_.warnings.push_back(fmt::format("{}: names the material file {}; {} is used.", path_.string(),
-                                                name, file->path.string()));
-      LIMN_TRY(const std::vector<MaterialSource> read, read_mtl(file->path, &content_.warnings));
-      for (const MaterialSource& material : read) add_material(material);
+    if (is_missing)
+      content_.warnings.push_back(
+          fmt::format("{}: its faces name texture coordinates or normals that it does not hold; it is shown "
+                      "without them.",
+                      path_.string()));
+    return {};
+  }
+
+  // The names behind mtllib: one name, which may have blanks, or several. A backslash may stand before a
+  // blank.
+  std::vector<std::string> library_names(const std::string& text) const {
+    std::string whole, name;
+    std::vector<std::string> each;
+    for (std::size_t i = 0; i <= text.size(); ++i) {
+      const bool is_escaped = text.compare(i, 2, "\\ ") == 0;
+      if (is_escaped) ++i;
+      if (i < text.size()) whole += text[i];
+      if (i < text.size() && (is_escaped || !std::isspace(static_cast<unsigned char>(text[i])))) {
+        name += text[i];
+      } else if (!name.empty()) {
+        each.push_back(std::exchange(name, {}));
+      }
     }
+    return find_named_file(path_.parent_path(), whole) ? std::vector{whole} : each;
+  }
+
+  Status read_materials(const std::string& text) {
+    const fs::path folder = path_.parent_path();
+    const std::vector<std::string> names = library_names(text);
+    bool is_any_found = false;
+    std::string missing;
+    for (const std::string& name : names) {
+      const auto file = find_named_file(folder, name);
+      if (!file) missing += (missing.empty() ? "" : ", ") + name;
+      if (!file) continue;
+      is_any_found = true;
+      if (file->is_other_case) note_library(name, file->path);
+      LIMN_TRY_STATUS(read_library(file->path));
+    }
+    if (is_any_found && !missing.empty())
+      content_.warnings.push_back(fmt::format(
+          "{}: expected the material files {}, found none of these names.", path_.string(), missing));
+    if (is_any_found) return {};
+    // The mesh may have been renamed together with its materials.
+    const auto own = find_named_file(folder, path_.stem().string() + ".mtl");
+    if (own) {
+      note_library(text, own->path);
+      return read_library(own->path);
+    }
+    is_library_missing_ = true;
+    content_.warnings.push_back(
+        fmt::format("{}: expected the material file {}, found none. Its surfaces are shown grey. Copy it "
+                    "beside the mesh.",
+                    path_.string(), text));
+    return {};
+  }
+
+  void note_library(const std::string& name, const fs::path& used) {
+    content_.warnings.push_back(
+        fmt::format("{}: names the material file {}; {} is used.", path_.string(), name, used.string()));
+  }
+
+  Status read_library(const fs::path& file) {
+    LIMN_TRY(const std::vector<MaterialSource> read, read_mtl(file, &content_.warnings));
+    for (const MaterialSource& material : read) add_material(material);
     return {};
   }
 

@@ -243,6 +243,9 @@ Result<MeshContent> read_with_assimp(const fs::path& path) {
   const bool is_without_faces =
       problem.find("no faces") != std::string::npos ||
       problem.find("No meshes remaining") != std::string::npos;  // only points and lines
+  if (problem.find("old format version") != std::string::npos)
+    return error("{}: expected FBX 2011 or newer, found an older one. Export it as a newer FBX, or as glTF.",
+                 path.string());
   if (!scene && !is_without_faces) return damaged_mesh(path, problem);
   if (!scene || !scene->mRootNode) return MeshContent{};
   return AssimpReader(*scene, path).read();

@@ -358,6 +358,20 @@ TEST(GltfMesh, WebpIsShownAndKtx2IsNamed) {
   EXPECT_TRUE(contains(error_of(ktx.glb()), "Switch KTX2 or Basis Universal off"));
 }
 
+// Some programs do not fill the text of a .glb up to four bytes.
+TEST(GltfMesh, AnUnalignedGlbIsRead) {
+  std::string bytes = plate().glb();
+  const std::size_t end = bytes.rfind('}') + 1, bin = bytes.find(std::string("BIN\0", 4)) - 4;
+  bytes.insert(end, " ");  // the text ends at an odd place
+  const auto put = [&](std::size_t at, std::size_t value) {
+    const auto number = static_cast<std::uint32_t>(value);
+    std::memcpy(&bytes[at], &number, 4);
+  };
+  put(8, bytes.size());
+  put(12, bin + 1 - 20);
+  EXPECT_TRUE(is_plate(loaded(bytes)));
+}
+
 TEST(GltfMesh, ExtensionsThatAreNotReadAreNamed) {
   Gltf file = plate();
   file.root["extensionsRequired"] = {"ACME_secret_geometry"};

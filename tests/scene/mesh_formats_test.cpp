@@ -103,11 +103,18 @@ TEST(ObjMesh, OddNumbersBlanksAndLineEndsAreRead) {
 
 TEST(ObjMesh, WhatCannotBeReadIsNamedWithItsLine) {
   EXPECT_TRUE(contains(error_of(written("a.obj", std::string(k_plate) + "f 1 2 5\n")),
-                       "a.obj: line 5: expected indices of the 4 entries"));
+                       "a.obj: line 5: expected indices of the file's 4 vertices, found 5"));
   EXPECT_TRUE(contains(error_of(written("b.obj", std::string(k_plate) + "f 0 1 2\n")), "b.obj: line 5"));
   EXPECT_TRUE(
       contains(error_of(written("c.obj", "v 0 0 0\nv 1,5 0 0\n")), "c.obj: line 2: expected numbers"));
   EXPECT_TRUE(contains(error_of(written("d.obj", "v 0 0\n")), "d.obj: line 1: expected 3 numbers or more"));
+}
+
+TEST(ObjMesh, FacesMayComeFirstOrNameNormalsThatAreNotThere) {
+  const Loaded plate = loaded(written("first.obj", std::string("f 1//1 2//2 3//3 4//4\n") + k_plate));
+  EXPECT_TRUE(test::near(sides_mm(plate.mesh), Vector3d(100, 80, 0), 1e-4));
+  EXPECT_TRUE(contains(plate.messages, "name texture coordinates or normals that it does not hold"));
+  EXPECT_NEAR(plate.mesh.normals.at(0).z(), 1, 1e-6);
 }
 
 TEST(ObjMesh, AConcavePolygonIsCutAlongItsInside) {
@@ -158,6 +165,10 @@ TEST(ObjMesh, AMissingMtlOrMaterialIsAWarning) {
   written("b/some.mtl", "newmtl steel\nKd 1 0 0\n");
   EXPECT_TRUE(contains(loaded(written("b/part.obj", "mtllib some.mtl\n" + faces)).messages,
                        "expected the materials 'wood'"));
+  written("d/my part.mtl", "newmtl wood\nKd 1 0 0\n");
+  const Loaded two = loaded(written("d/part.obj", "mtllib gone.mtl my\\ part.mtl\n" + faces));
+  EXPECT_TRUE(contains(two.messages, "expected the material files gone.mtl, found none"));
+  EXPECT_TRUE(test::near(colour_at(two.mesh, {0, 0, 0}), Vector3d(1, 0, 0), 1e-6));
   written("c/part.mtl", "newmtl wood\nKd 1 0 0\n");  // the file's name was changed together with the mesh's
   const Loaded renamed = loaded(written("c/part.obj", "mtllib before.mtl\n" + faces));
   EXPECT_TRUE(contains(renamed.messages, "part.mtl is used"));
