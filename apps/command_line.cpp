@@ -536,8 +536,9 @@ void add_align(CLI::App& app, Run& run) {
       "Scan: a PLY file or the folder of limn scan; without it the pose is computed from the markers alone");
   add_choice(command, "--scan-units", &options->scan_units, scene::k_length_units,
              "Unit of the PLY file: m, cm, mm, in or ft");
-  command->add_option("--mesh", options->mesh,
-                      "CAD mesh: .glb, .gltf, .obj, .stl or .ply; without it the scene's prototype");
+  command->add_option(
+      "--mesh", options->mesh,
+      "CAD mesh: .glb, .obj, .stl, .ply, .3mf, .fbx … (docs/formats.md); without it the scene's prototype");
   add_choice(command, "--units", &options->units, scene::k_length_units,
              "Unit of the CAD mesh: m, cm, mm, in or ft");
   command->add_option("--start", options->start, "POSES.json with world_from_prototype, the initial pose");

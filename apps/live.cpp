@@ -198,9 +198,9 @@ Status run_session(const LiveOptions& options,
   LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to, options.osc_from));
   LIMN_TRY(const std::unique_ptr<remote::Server> server, serve(options, setup));
   LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, options.record, &setup));
-  session::report_skipped(skipped_variants, {}, &output.telemetry());
   LIMN_TRY(session::Perception perception, session::Perception::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(session::Session session, session::Session::create(setup, &output.telemetry(), output.recorder()));
+  session.report_skipped(skipped_variants, {});
   session.survive_losses(drawing_in(&context));
   std::optional<session::OperatorConsole> console;
   if (options.window) {

@@ -140,6 +140,34 @@ Result<scene::PosedScene> place(const RenderOptions& options,
   return scene::posed(scene, tracks);
 }
 
+// Error: the poses name a variant that cannot be loaded, or no variant where the first one cannot be.
+Status check_posed(const std::filesystem::path& poses,
+                   std::span<const scene::SkippedVariant> skipped_variants) {
+  LIMN_TRY(const Config config, Config::load(poses, ""));
+  const auto slots = config.root().find("slots");
+  for (const scene::SkippedVariant& skipped : skipped_variants) {
+    const auto slot = slots ? slots->find(skipped.slot) : std::nullopt;
+    const auto variant = slot ? slot->find("variant") : std::nullopt;
+    const bool is_shown =
+        slot && (variant ? variant->is_string() && variant->text() == skipped.variant : skipped.is_first);
+    if (is_shown) return error("{}", skipped.why);
+  }
+  return {};
+}
+
+// Error: a slot that was found would show a variant that cannot be loaded.
+Status check_placed(const scene::Scene& scene,
+                    const scene::PosedScene& posed,
+                    std::span<const scene::SkippedVariant> skipped_variants) {
+  for (const scene::SkippedVariant& skipped : skipped_variants) {
+    const bool is_placed =
+        std::any_of(posed.parts.begin(), posed.parts.end(),
+                    [&](const scene::PosedPart& part) { return part.slot == skipped.slot; });
+    if (skipped.is_first && (is_placed || !scene.find_slot(skipped.slot))) return error("{}", skipped.why);
+  }
+  return {};
+}
+
 // The bodies' poses that belong to the posed scene, whether it comes from frames or from a file.
 std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene& posed) {
   std::vector<Track> tracks;
@@ -298,9 +326,14 @@ Status run_render(const RenderOptions& options) {
         *options.stereo_mm);
   }
   LIMN_TRY(Rig rig, load_rig(options.rig));
-  LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene));
+  std::vector<scene::SkippedVariant> skipped_variants;
+  LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene, &skipped_variants));
+  if (!options.poses.empty()) LIMN_TRY_STATUS(check_posed(options.poses, skipped_variants));
   LIMN_TRY(const Frames frames, read_frames(options.frames, &rig));
   LIMN_TRY(const scene::PosedScene posed, place(options, scene, rig, frames));
+  if (options.poses.empty()) LIMN_TRY_STATUS(check_placed(scene, posed, skipped_variants));
+  for (const scene::SkippedVariant& skipped : skipped_variants)
+    log_warning("render: {}", scene::to_text(skipped));
   LIMN_TRY(const Imager viewer, choose_viewer(options, scene, posed, rig));
   report_missing(scene, posed);
   report_odd(scene, rig, posed, viewer);

@@ -14,6 +14,7 @@
 #include "device/window.h"
 #include "session/frame_loop.h"
 #include "session/recording.h"
+#include "session/scene_change.h"
 
 namespace limn::apps {
 namespace {
@@ -182,9 +183,10 @@ class Recording final : public session::FrameClock, public session::FrameSource 
 
   Status replace_scene(const std::string& folder) {
     LIMN_TRY(const fs::path path, inside(folder));
-    std::vector<scene::SkippedVariant> skipped_variants;  // the session left them out, too
-    LIMN_TRY(scene::Scene scene, scene::load_scene(path, &skipped_variants));
-    return session_->replace_scene(std::move(scene), session_->percepts().captured_at);
+    session::LoadedScene loaded;  // the session left out and kept the same variants
+    LIMN_TRY(loaded.scene, scene::load_scene(path, &loaded.skipped_variants, scene::EmptySlots::kept));
+    session::keep_old_variants(session_->setup().scene, &loaded);
+    return session_->replace_scene(std::move(loaded.scene), session_->percepts().captured_at);
   }
 
   Status edit(const Json& json, const std::string& source) {

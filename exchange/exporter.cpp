@@ -48,7 +48,7 @@ Result<ExportJob> load_export_job(const ExportOptions& options) {
   ExportJob job;
   LIMN_TRY(job.rig, load_rig(options.rig));
   if (!needs_prototype(options)) return job;
-  LIMN_TRY(job.scene, scene::load_scene(options.scene));
+  LIMN_TRY(job.scene, scene::load_usable_scene(options.scene));
   LIMN_TRY(job.posed, scene::load_poses(options.poses, job.scene));
   if (job.rig.projectors.empty())
     return error("{}: expected a rig with projectors, found none.", options.rig.string());

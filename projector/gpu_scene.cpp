@@ -38,9 +38,12 @@ std::size_t triangles_of(const scene::Scene& scene) {
   return count;
 }
 
-// Number of triangles with tangents, which are stored after the normals.
-std::size_t triangles_with_tangents(const scene::Scene& scene) {
-  const auto of = [](const scene::Mesh& mesh) { return mesh.tangents.empty() ? 0 : mesh.triangles.size(); };
+// Number of triangles with tangents, plus that of triangles with colours: these are stored after the normals.
+std::size_t triangles_after_normals(const scene::Scene& scene) {
+  const auto of = [](const scene::Mesh& mesh) {
+    return (mesh.tangents.empty() ? 0 : mesh.triangles.size()) +
+           (mesh.colours.empty() ? 0 : mesh.triangles.size());
+  };
   std::size_t count = scene.prototype ? of(scene.prototype->mesh) : 0;
   for (const scene::Slot& slot : scene.slots)
     for (const scene::Variant& variant : slot.variants) count += of(variant.mesh);
@@ -163,7 +166,7 @@ scene::Texture packed(const scene::SurfaceMaps& maps) {
 
 struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> corners, normals;
-  std::vector<Eigen::Vector4f> tangents;  // tangents at the corners, stored after the normals
+  std::vector<Eigen::Vector4f> after_normals;  // tangents and colours at the corners
   std::vector<GpuTriangle> triangles;
   std::vector<GpuMaterial> materials;
   std::vector<scene::Texture> colour_maps, maps;
@@ -176,11 +179,12 @@ std::size_t GpuScene::most_triangles() {
 }
 
 Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
-  const std::size_t count = triangles_of(scene) + triangles_with_tangents(scene);
+  const std::size_t count = triangles_of(scene) + triangles_after_normals(scene);
   if (count <= most) return {};
   return error(
       "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}; "
-      "triangles of meshes with a normal map count twice), found {}. Simplify the largest mesh.",
+      "triangles of meshes with a normal map or with colours at their vertices count twice), found {}. "
+      "Simplify the largest mesh.",
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
@@ -205,7 +209,7 @@ GpuScene::GpuScene(const scene::Scene& scene) {
     slots_.push_back(std::move(runs));
   }
   corners_ = buffer_of(std::exchange(staging.corners, {}));  // each array is freed after its upload
-  staging.normals.insert(staging.normals.end(), staging.tangents.begin(), staging.tangents.end());
+  staging.normals.insert(staging.normals.end(), staging.after_normals.begin(), staging.after_normals.end());
   normals_ = buffer_of(std::exchange(staging.normals, {}));
   triangles_ = buffer_of(std::exchange(staging.triangles, {}));
   materials_ = buffer_of(staging.materials);
@@ -257,7 +261,7 @@ void GpuScene::add_material(const scene::Material& material, bool has_uvs, Stagi
 // Must be called before the mesh's own corners are added.
 void GpuScene::add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging) {
   // The tangents come after all normals, three for each of `triangles`.
-  const std::size_t first = 3 * staging->triangles.size() + staging->tangents.size();
+  const std::size_t first = 3 * staging->triangles.size() + staging->after_normals.size();
   for (std::size_t i = first_material; i < staging->materials.size(); ++i) {
     GpuMaterial& material = staging->materials[i];
     if (mesh.tangents.empty()) material.maps.y() = -1;
@@ -265,7 +269,20 @@ void GpuScene::add_tangents(const scene::Mesh& mesh, std::size_t first_material,
   }
   if (mesh.tangents.empty()) return;
   for (const auto& triangle : mesh.triangles)
-    for (const std::uint32_t i : triangle) staging->tangents.push_back(mesh.tangents[i]);
+    for (const std::uint32_t i : triangle) staging->after_normals.push_back(mesh.tangents[i]);
+}
+
+// Must be called before the mesh's own corners are added.
+void GpuScene::add_colours(const scene::Mesh& mesh, std::size_t first_material, Staging* staging) {
+  if (mesh.colours.empty()) return;
+  has_vertex_colours_ = true;
+  const std::size_t first = 3 * staging->triangles.size() + staging->after_normals.size();
+  for (std::size_t i = first_material; i < staging->materials.size(); ++i)
+    staging->materials[i].more.tail<2>()
+        << static_cast<int>(first) - static_cast<int>(staging->corners.size()),
+        1;
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t i : triangle) staging->after_normals.push_back(mesh.colours[i].homogeneous());
 }
 
 TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) {
@@ -279,6 +296,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   run.first = static_cast<int>(staging->corners.size() / 3);
   run.count = static_cast<int>(mesh.triangles.size());
   add_tangents(mesh, first_material, staging);
+  add_colours(mesh, first_material, staging);
   Eigen::AlignedBox3d bounds;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % k_cluster == 0) run.clusters.push_back({run.first + static_cast<int>(t), 0, {}});

@@ -61,7 +61,10 @@ class GpuScene final : public Bindable {
 
   bool has_cut_outs() const { return has_cut_outs_; }
   /// Defines that the shading programs need for the scene's materials.
-  Defines shading_defines() const { return has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}; }
+  Defines shading_defines() const {
+    return (has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}) +
+           (has_vertex_colours_ ? Defines{Define::vertex_colours} : Defines{});
+  }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
 
@@ -82,10 +85,11 @@ class GpuScene final : public Bindable {
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
   void add_material(const scene::Material& material, bool has_uvs, Staging* staging);
   void add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
+  void add_colours(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
-  bool has_cut_outs_ = false, has_surface_maps_ = false;
+  bool has_cut_outs_ = false, has_surface_maps_ = false, has_vertex_colours_ = false;
   std::vector<GpuOwner> gpu_owners_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
   GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers

@@ -145,6 +145,7 @@ struct Document {
       attributes["TEXCOORD_0"] = add_vectors(flipped, "VEC2", false);
     }
     if (!mesh.tangents.empty()) attributes["TANGENT"] = add_vectors(mesh.tangents, "VEC4", false);
+    if (!mesh.colours.empty()) attributes["COLOR_0"] = add_vectors(mesh.colours, "VEC3", false);
     ordered_json primitives = ordered_json::array();
     for (std::size_t m = 0; m < mesh.materials.size(); ++m) {
       const std::size_t material = add_material(mesh.materials[m]);

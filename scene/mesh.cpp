@@ -1,19 +1,14 @@
 #include "scene/mesh.h"
 
-#include <assimp/scene.h>
 #include <meshoptimizer.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <assimp/DefaultLogger.hpp>
-#include <assimp/Importer.hpp>
-#include <assimp/LogStream.hpp>
-#include <cctype>
 #include <cmath>
-#include <fstream>
-#include <sstream>
+#include <mutex>
 
 #include "core/log.h"
+#include "scene/mesh_content.h"
 #include "scene/mesh_trial.h"
 #include "scene/read_materials.h"
 #include "scene/tangents.h"
@@ -31,8 +26,9 @@ struct Corner {
   Eigen::Vector3f position;
   Eigen::Vector3f normal;
   Eigen::Vector2f uv;
+  Eigen::Vector3f colour;
 };
-static_assert(sizeof(Corner) == 8 * sizeof(float));
+static_assert(sizeof(Corner) == 11 * sizeof(float));
 
 // A mesh as it comes from the file: three corners per triangle, no shared vertices.
 struct Soup {
@@ -40,30 +36,8 @@ struct Soup {
   std::vector<Eigen::Vector4f> tangents;  // per corner, as in Mesh; empty: the file has none
   std::vector<std::uint16_t> triangle_materials;
   bool has_uvs = false;
-  bool needs_normals = false;
+  bool has_colours = false;
 };
-
-std::string extension(const fs::path& path) {
-  std::string text = path.extension().string();
-  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
-
-Eigen::Matrix4f to_eigen(const aiMatrix4x4& m) {
-  Eigen::Matrix4f out;
-  out << m.a1, m.a2, m.a3, m.a4, m.b1, m.b2, m.b3, m.b4, m.c1, m.c2, m.c3, m.c4, m.d1, m.d2, m.d3, m.d4;
-  return out;
-}
-
-Eigen::Vector3f to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
-
-// A vertex's tangent in the file's frame. If `turn` mirrors, the handedness changes.
-Eigen::Vector4f tangent_of(const aiMesh& mesh, unsigned i, const Eigen::Matrix3f& turn) {
-  const Eigen::Vector3f t = to_eigen(mesh.mTangents[i]), b = to_eigen(mesh.mBitangents[i]);
-  const float hand = to_eigen(mesh.mNormals[i]).cross(t).dot(b) * turn.determinant();
-  const Eigen::Vector3f turned = (turn * t).normalized();
-  return {turned.x(), turned.y(), turned.z(), hand < 0 ? -1.F : 1.F};
-}
 
 // Whether the texture's axes are parallel to its coordinates' axes, as a file's tangents assume.
 bool is_upright(const TexturePlace& place) {
@@ -71,55 +45,33 @@ bool is_upright(const TexturePlace& place) {
   return m(0, 0) > 0 && m(1, 1) > 0 && std::max(std::abs(m(0, 1)), std::abs(m(1, 0))) < 1e-6F;
 }
 
-void append(const aiMesh& mesh,
-            const TexturePlace& place,
-            const Eigen::Matrix4f& file_from_node,
-            float metres,
-            Soup* soup) {
-  const Eigen::Matrix3f turn = file_from_node.topLeftCorner<3, 3>();
-  const Eigen::Matrix3f normal_turn = turn.inverse().transpose();
-  const bool mirrored = turn.determinant() < 0;  // a mirroring transform turns the triangles inside out
-  const bool has_normals = mesh.HasNormals();
-  soup->needs_normals |= !has_normals;
-  const auto coordinates = static_cast<unsigned>(place.coordinates);
-  const aiVector3D* uvs = mesh.HasTextureCoords(coordinates) ? mesh.mTextureCoords[coordinates] : nullptr;
-  soup->has_uvs |= uvs != nullptr;
-  const bool has_tangents = has_normals && mesh.HasTangentsAndBitangents() && is_upright(place);
+// Adds a piece whose coordinates are `metres` long.
+void append(const MeshPiece& piece, const TexturePlace& place, double metres, Soup* soup) {
+  soup->has_uvs |= !piece.uvs.empty();
+  soup->has_colours |= !piece.colours.empty();
+  const bool has_tangents = !piece.normals.empty() && !piece.tangents.empty() && is_upright(place);
   if (has_tangents) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
-  for (unsigned f = 0; f < mesh.mNumFaces; ++f) {
-    const aiFace& face = mesh.mFaces[f];
-    if (face.mNumIndices != 3) continue;
-    for (unsigned k = 0; k < 3; ++k) {
-      const unsigned i = face.mIndices[mirrored ? 2 - k : k];
+  for (const auto& triangle : piece.triangles) {
+    for (const std::uint32_t i : triangle) {
       Corner corner;
-      corner.position =
-          ((turn * to_eigen(mesh.mVertices[i]) + file_from_node.topRightCorner<3, 1>()) * metres).array() +
-          0.f;
-      corner.normal = has_normals ? Eigen::Vector3f((normal_turn * to_eigen(mesh.mNormals[i])).normalized())
-                                  : Eigen::Vector3f::Zero().eval();
-      corner.uv = uvs ? place.moved * Eigen::Vector2f(uvs[i].x, uvs[i].y) : Eigen::Vector2f::Zero().eval();
+      corner.position = (piece.positions[i] * static_cast<float>(metres)).array() + 0.f;
+      corner.normal = piece.normals.empty() ? Eigen::Vector3f::Zero().eval() : piece.normals[i];
+      corner.uv = piece.uvs.empty() ? Eigen::Vector2f::Zero().eval() : place.moved * piece.uvs[i];
+      const bool has_colour = !piece.colours.empty() && piece.colours[i].allFinite();
+      corner.colour = has_colour ? piece.colours[i] : Eigen::Vector3f::Ones().eval();
       soup->corners.push_back(corner);
-      if (has_tangents) soup->tangents.push_back(tangent_of(mesh, i, turn));
+      if (has_tangents) soup->tangents.push_back(piece.tangents[i]);
     }
-    soup->triangle_materials.push_back(static_cast<std::uint16_t>(mesh.mMaterialIndex));
+    soup->triangle_materials.push_back(static_cast<std::uint16_t>(piece.material));
   }
   if (!soup->tangents.empty()) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
 }
 
-void append(const aiScene& scene,
-            const aiNode& node,
-            const Eigen::Matrix4f& file_from_parent,
-            float metres,
-            Soup* soup) {
-  const Eigen::Matrix4f file_from_node = file_from_parent * to_eigen(node.mTransformation);
-  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
-    const aiMesh& mesh = *scene.mMeshes[node.mMeshes[i]];
-    const bool has_material = mesh.mMaterialIndex < scene.mNumMaterials;
-    append(mesh, has_material ? texture_place(*scene.mMaterials[mesh.mMaterialIndex]) : TexturePlace{},
-           file_from_node, metres, soup);
-  }
-  for (unsigned i = 0; i < node.mNumChildren; ++i)
-    append(scene, *node.mChildren[i], file_from_node, metres, soup);
+Soup soup_of(const MeshContent& content, double metres) {
+  Soup soup;
+  for (const MeshPiece& piece : content.pieces)
+    append(piece, texture_place(content.materials[piece.material]), metres, &soup);
+  return soup;
 }
 
 Eigen::Vector3f face_normal(const Soup& soup, std::size_t triangle) {
@@ -183,10 +135,12 @@ Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
   mesh.positions.resize(count);
   mesh.normals.resize(count);
   if (soup.has_uvs) mesh.uvs.resize(count);
+  if (soup.has_colours) mesh.colours.resize(count);
   for (std::size_t c = 0; c < corner_count; ++c) {
     mesh.positions[remap[c]] = soup.corners[c].position;
     mesh.normals[remap[c]] = soup.corners[c].normal;
     if (soup.has_uvs) mesh.uvs[remap[c]] = soup.corners[c].uv;
+    if (soup.has_colours) mesh.colours[remap[c]] = soup.corners[c].colour;
   }
   for (std::size_t t = 0; t < soup.triangle_materials.size(); ++t) {
     if (!(face_normal(soup, t).squaredNorm() > 0)) continue;  // without area
@@ -229,67 +183,35 @@ Error no_triangles(const fs::path& path) {
   return error("{}: expected triangles, found none. Export the mesh with its faces.", path.string());
 }
 
-// Assimp's STL reader gives each triangle its own normal. These are dropped, so that curved surfaces are
-// smooth.
-void drop_normals(Soup* soup) {
-  for (Corner& corner : soup->corners) corner.normal.setZero();
-  soup->needs_normals = true;
+// Sets broken normals to zero; true: a normal has to be computed.
+bool has_missing_normals(Soup* soup) {
+  bool is_missing = false;
+  for (Corner& corner : soup->corners) {
+    if (!corner.normal.allFinite()) corner.normal.setZero();
+    is_missing |= corner.normal.squaredNorm() < 0.25f;
+  }
+  return is_missing;
 }
 
-Status known_format(const fs::path& path) {
-  const std::string format = extension(path);
-  for (const char* known : {".glb", ".gltf", ".obj", ".stl", ".ply"}) {
-    if (format == known) return {};
-  }
-  return error(
-      "{}: expected a mesh file (.glb, .gltf, .obj, .stl or .ply), found '{}'. Export it as one of these.",
-      path.string(), format);
+// Metres of the file's coordinates: in the unit that a person has given, or else in the file's own.
+Result<double> metres_of(const MeshContent& content, const fs::path& path, std::optional<LengthUnit> units) {
+  if (!units && !content.metres_per_unit)
+    return error("{}: expected its unit (m, cm, mm, in or ft), because {} files state none, found none.",
+                 path.string(), lower_extension(path));
+  if (!units) return *content.metres_per_unit;
+  const double given = metres_per_unit(*units);
+  if (content.metres_per_unit && std::abs(*content.metres_per_unit / given - 1) > 1e-3)
+    log_info("{}: is read in {} as given; the file itself says {:.4g} m for a unit", path.string(),
+             to_text(*units), *content.metres_per_unit);
+  return given;
 }
 
-// Collects assimp's warnings while it exists: assimp drops bad triangles with only a warning. It must be used
-// by one thread at a time, because assimp's logger is global.
-class Complaints {
- public:
-  Complaints() {
-    Assimp::DefaultLogger::create(nullptr, Assimp::Logger::NORMAL, 0);
-    Assimp::DefaultLogger::get()->attachStream(&stream_, k_severities);
-  }
-  ~Complaints() {
-    Assimp::DefaultLogger::get()->detachStream(&stream_, k_severities);
-    Assimp::DefaultLogger::kill();
-  }
-  Complaints(const Complaints&) = delete;
-  Complaints& operator=(const Complaints&) = delete;
-  const std::string& text() const { return stream_.text; }
-
- private:
-  static constexpr unsigned k_severities = Assimp::Logger::Err | Assimp::Logger::Warn;
-  struct Stream : Assimp::LogStream {
-    void write(const char* message) override { text += message; }
-    std::string text;
-  };
-  Stream stream_;
-};
-
-// On a PLY file whose header has no end assimp searches for ever.
-Status check_ply_header(const fs::path& path) {
-  constexpr int k_most_lines = 10000;
-  std::error_code ignored;
-  const auto bytes = fs::file_size(path, ignored);
-  std::ifstream in(path, std::ios::binary);
-  std::string line, word, name;
-  for (int i = 0; i < k_most_lines && std::getline(in, line); ++i) {
-    if (line.ends_with('\r')) line.pop_back();
-    if (i == 0 && line != "ply") break;
-    if (line == "end_header") return {};
-    std::uintmax_t count = 0;
-    if (std::istringstream(line) >> word >> name >> count && word == "element" && count > bytes)
-      return error(
-          "{}: expected a whole ply mesh, found {} bytes that are to hold {} elements '{}'. Export it again.",
-          path.string(), bytes, count, name);
-  }
-  return error("{}: expected a whole ply mesh, found no header from 'ply' to 'end_header'. Export it again.",
-               path.string());
+// One mesh is read at a time, because assimp's logger is global and a process is copied for the trial.
+Result<MeshContent> read_safely(const fs::path& path) {
+  static std::mutex one_at_a_time;
+  const std::lock_guard lock(one_at_a_time);
+  LIMN_TRY_STATUS(try_mesh_reader(path));
+  return read_mesh_content(path);
 }
 
 }  // namespace
@@ -310,55 +232,25 @@ double metres_per_unit(LengthUnit units) {
   return 0.3048;
 }
 
-Result<Mesh> load_mesh(const fs::path& path, LengthUnit units) {
-  LIMN_TRY_STATUS(known_format(path));
+Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
+  if (!is_mesh_name(path)) return read_mesh_content(path).error();
   if (std::error_code code; !fs::is_regular_file(path, code)) {
     return error("{}: expected a mesh file, found no file. Check the name.", path.string());
   }
-  if (extension(path) == ".ply") {
-    LIMN_TRY_STATUS(check_ply_header(path));
-  }
-  LIMN_TRY_STATUS(try_mesh_reader(path));
-  Assimp::Importer importer;
-  Complaints complaints;
-  const aiScene* scene = read_with_assimp(path, &importer);
-  if (complaints.text().find("out-of-range indices") != std::string::npos) {
-    return error(
-        "{}: expected triangles of the mesh's own vertices, found indices beyond their number. Export it "
-        "again.",
-        path.string());
-  }
-  const std::string problem = importer.GetErrorString();
-  const bool without_faces =
-      problem.find("no faces") != std::string::npos ||
-      problem.find("No meshes remaining") != std::string::npos;  // the file has only points and lines
-  if (!scene && without_faces) return no_triangles(path);
-  if (!scene) {
-    return error("{}: expected a complete {} mesh, found one that cannot be read ({}). Export it again.",
-                 path.string(), extension(path).substr(1), problem);
-  }
-  if (!scene->mRootNode) return no_triangles(path);
-  Soup soup;
-  append(*scene, *scene->mRootNode, Eigen::Matrix4f::Identity(), static_cast<float>(metres_per_unit(units)),
-         &soup);
+  LIMN_TRY(const MeshContent content, read_safely(path));
+  for (const std::string& warning : content.warnings) log_warning("{}", warning);
+  if (content.pieces.empty()) return no_triangles(path);
+  LIMN_TRY(const double metres, metres_of(content, path, units));
+  Soup soup = soup_of(content, metres);
   if (soup.triangle_materials.empty()) return no_triangles(path);
   LIMN_TRY_STATUS(check_mesh(soup, path));
-  if (extension(path) == ".stl") drop_normals(&soup);
-  const bool broken_normal = std::any_of(soup.corners.begin(), soup.corners.end(), [](Corner& corner) {
-    if (!corner.normal.allFinite()) corner.normal.setZero();
-    return corner.normal.squaredNorm() < 0.25f;
-  });
-  if (soup.needs_normals || broken_normal) make_normals(&soup);
+  if (has_missing_normals(&soup)) make_normals(&soup);
 
   std::vector<Eigen::Vector4f> corner_tangents;
   Mesh mesh = joined(soup, &corner_tangents);
   if (mesh.triangles.empty()) return no_triangles(path);
-  LIMN_TRY(mesh.materials,
-           read_materials(*scene, path, extension(path) == ".glb" || extension(path) == ".gltf"));
-  if (mesh.materials.empty()) mesh.materials.emplace_back();
-  for (std::uint16_t& index : mesh.triangle_materials) {
-    if (index >= mesh.materials.size()) index = 0;
-  }
+  mesh.metres_per_unit = metres;
+  LIMN_TRY(mesh.materials, read_materials(content, path));
   if (mesh.uvs.empty()) leave_out_maps(path, &mesh);
   const auto has_normal_map = [](const Material& m) { return !m.maps.normals.image.empty(); };
   if (std::any_of(mesh.materials.begin(), mesh.materials.end(), has_normal_map))

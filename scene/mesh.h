@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,9 +22,12 @@ struct Mesh {
   /// Unit tangent per position, along the surface towards increasing u. w is 1 where normal x tangent points
   /// towards increasing v, else -1. Empty when no material has a normal map (scene/tangents.h).
   std::vector<Eigen::Vector4f> tangents = {};
+  /// Linear RGB per position, which multiplies the material's base colour; empty: the mesh has none.
+  std::vector<Eigen::Vector3f> colours = {};
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<std::uint16_t> triangle_materials;  ///< Per triangle, index into materials.
   std::vector<Material> materials = {Material{}};
+  double metres_per_unit = 1;  ///< The unit of the file's coordinates.
 };
 
 /// The unit of a mesh's coordinates.
@@ -32,9 +36,10 @@ inline constexpr EnumNames<LengthUnit, 5> k_length_units{{"m", "cm", "mm", "in",
 inline std::string to_text(LengthUnit unit) { return k_length_units.text(unit); }
 double metres_per_unit(LengthUnit units);
 
-/// Reads a glb, gltf, obj, stl or ply file and scales it by metres_per_unit(units). Missing normals are
-/// computed; equal vertices are merged. Errors: unreadable or truncated file, no triangles, NaN or infinite
-/// coordinates.
-Result<Mesh> load_mesh(const std::filesystem::path& path, LengthUnit units);
+/// Reads a mesh file (docs/formats.md#meshes) and scales its coordinates by metres_per_unit(units). Without
+/// `units` the unit is the one that the file states; `units` replaces it, with a message where they differ.
+/// Missing normals are computed; equal vertices are merged. What is shown otherwise than the file says is a
+/// warning. Errors: unreadable or truncated file, no triangles, NaN or infinite coordinates, no unit.
+Result<Mesh> load_mesh(const std::filesystem::path& path, std::optional<LengthUnit> units);
 
 }  // namespace limn::scene

@@ -1,35 +1,27 @@
 #include "scene/mesh_trial.h"
 
-#include <assimp/config.h>
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <assimp/Importer.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstring>
 #include <fstream>
-#include <mutex>
 #include <new>
+
+#include "scene/mesh_content.h"
 
 namespace limn::scene {
 
 namespace fs = std::filesystem;
 
-const aiScene* read_with_assimp(const fs::path& path, Assimp::Importer* importer) {
-  importer->SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  return importer->ReadFile(path.string(),
-                            aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_ValidateDataStructure);
-}
-
 namespace {
 
 constexpr double k_least_s = 0.9, k_bytes_a_second = 2e6;
+constexpr double k_packed_bytes_a_second = 5e5;  // where a format may be compressed
 constexpr rlim_t k_least_memory = rlim_t{1} << 30;
 constexpr rlim_t k_memory_per_byte = 200;  // an ASCII vertex of 20 bytes becomes a few hundred
 constexpr int k_no_memory = 3;             // exit code
@@ -41,6 +33,28 @@ constexpr bool k_limits_memory = !__has_feature(address_sanitizer);
 #else
 constexpr bool k_limits_memory = true;
 #endif
+
+// Bytes that may be read for a mesh: a .gltf has its buffers in other files, beside it or in a folder there.
+std::uintmax_t bytes_of(const fs::path& path) {
+  constexpr int k_most_files = 10000;
+  std::error_code none;
+  std::uintmax_t bytes = 0;
+  if (lower_extension(path) != ".gltf") return fs::file_size(path, none);
+  fs::recursive_directory_iterator at(path.has_parent_path() ? path.parent_path() : fs::path("."), none);
+  for (int i = 0; i < k_most_files && !none && at != fs::recursive_directory_iterator(); ++i) {
+    std::error_code gone;
+    if (at->is_regular_file(gone)) bytes += at->file_size(gone);
+    if (at.depth() > 0) at.disable_recursion_pending();
+    at.increment(none);
+  }
+  return bytes;
+}
+
+double seconds_for(const fs::path& path, std::uintmax_t bytes) {
+  const std::string end = lower_extension(path);
+  const bool is_packed = end == ".glb" || end == ".gltf" || end == ".3mf";
+  return k_least_s + static_cast<double>(bytes) / (is_packed ? k_packed_bytes_a_second : k_bytes_a_second);
+}
 
 // The size of this process's address space, bytes.
 rlim_t address_space() {
@@ -59,12 +73,10 @@ void limit(int resource, rlim_t value) {
   for (const int signal : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTERM}) std::signal(signal, SIG_DFL);
   limit(RLIMIT_CORE, 0);
   if (k_limits_memory) limit(RLIMIT_AS, memory);
-  dup2(open("/dev/null", O_WRONLY | O_CLOEXEC), STDERR_FILENO);  // assimp's asserts are not for people
+  dup2(open("/dev/null", O_WRONLY | O_CLOEXEC), STDERR_FILENO);  // the libraries' asserts are not for people
   try {
-    Assimp::Importer importer;
-    read_with_assimp(path, &importer);
-    const std::string problem = importer.GetErrorString();
-    _exit(problem.find("bad_alloc") != std::string::npos ? k_no_memory : 0);
+    const auto content = read_mesh_content(path);
+    _exit(!content && content.message().find("bad_alloc") != std::string::npos ? k_no_memory : 0);
   } catch (const std::bad_alloc&) {
     _exit(k_no_memory);
   } catch (...) {
@@ -80,12 +92,9 @@ Error damaged(const fs::path& path, const std::string& what) {
 }  // namespace
 
 Status try_mesh_reader(const fs::path& path) {
-  static std::mutex one_at_a_time;  // also, no other thread is inside assimp while the process is copied
-  const std::lock_guard lock(one_at_a_time);
-  std::error_code ignored;
-  const auto bytes = fs::file_size(path, ignored);
+  const std::uintmax_t bytes = bytes_of(path);
   const rlim_t memory = address_space() + k_least_memory + k_memory_per_byte * static_cast<rlim_t>(bytes);
-  const double seconds = k_least_s + static_cast<double>(bytes) / k_bytes_a_second;
+  const double seconds = seconds_for(path, bytes);
   int ends[2];  // The child's end is closed when the child has ended.
   if (pipe2(ends, O_CLOEXEC) != 0)
     return error("{}: cannot be tried: {}.", path.string(), std::strerror(errno));

@@ -1,9 +1,5 @@
 #include "scene/read_materials.h"
 
-#include <assimp/GltfMaterial.h>
-#include <assimp/material.h>
-#include <assimp/scene.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -11,63 +7,63 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <string_view>
+#include <tuple>
 #include <utility>
 
+#include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "scene/named_file.h"
 
 namespace limn::scene {
 namespace {
 
 namespace fs = std::filesystem;
 
-Result<cv::Mat> embedded_texture(const aiTexture& texture, const fs::path& path, bool with_alpha) {
-  if (texture.mHeight > 0) {
-    static_assert(sizeof(aiTexel) == 4);  // b, g, r, a
-    const cv::Mat bgra(static_cast<int>(texture.mHeight), static_cast<int>(texture.mWidth), CV_8UC4,
-                       texture.pcData);
-    if (with_alpha) return bgra.clone();
-    cv::Mat bgr(bgra.size(), CV_8UC3);
-    const int from_to[] = {0, 0, 1, 1, 2, 2};
-    cv::mixChannels(&bgra, 1, &bgr, 1, from_to, 3);
+// What the bytes of an image are that cannot be read.
+std::string kind_of(std::string_view bytes) {
+  if (bytes.substr(0, 7) == "\xabKTX 20")
+    return "a KTX2 texture (KHR_texture_basisu), which Limn does not read. Switch KTX2 or Basis Universal "
+           "off when you "
+           "export it, or export PNG, JPEG or WebP textures";
+  if (bytes.substr(0, 4) == "DDS ")
+    return "a DDS texture, which Limn does not read. Export PNG, JPEG or WebP textures";
+  return fmt::format("{} bytes of something else. Export the mesh again", bytes.size());
+}
+
+Result<cv::Mat> embedded_texture(const EmbeddedImage& embedded, const fs::path& path, bool with_alpha) {
+  if (!embedded.pixels.empty()) {
+    if (with_alpha) return embedded.pixels.clone();
+    cv::Mat bgr;
+    cv::cvtColor(embedded.pixels, bgr, cv::COLOR_BGRA2BGR);
     return bgr;
   }
-  const cv::Mat bytes(1, static_cast<int>(texture.mWidth), CV_8U, texture.pcData);
-  cv::Mat image = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
-  if (image.empty()) {
-    return error(
-        "{}: expected a PNG or JPEG as embedded texture, found {} bytes of something else. "
-        "Export the mesh again.",
-        path.string(), texture.mWidth);
+  cv::Mat image;
+  try {
+    const cv::Mat bytes(1, static_cast<int>(embedded.bytes.size()), CV_8U,
+                        const_cast<char*>(embedded.bytes.data()));
+    if (!embedded.bytes.empty())
+      image = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
+  } catch (const cv::Exception&) {
+    image.release();
   }
+  if (image.empty())
+    return error("{}: expected a PNG, JPEG or WebP as embedded texture, found {}.", path.string(),
+                 kind_of(embedded.bytes));
   if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257);
   return image;
 }
 
-// The path of a texture that a mesh names: as written, or else the bare file name beside the mesh.
-fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
-  std::string slashes = name;
-  std::replace(slashes.begin(), slashes.end(), '\\', '/');
-  const fs::path folder = mesh_path.parent_path();
-  const fs::path inside =
-      fs::path(slashes).is_relative() ? folder / slashes : folder / fs::path(slashes).filename();
-  return fs::exists(inside) ? inside : folder / fs::path(slashes).filename();
-}
-
 Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
   auto image = with_alpha ? read_image_with_alpha(path) : read_image(path);
-  if (!image) return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
-  return image;
-}
-
-// The alpha below which a glTF material has holes; 0: it has none. Transparency (alphaMode BLEND) is rounded
-// at one half, because projected light cannot be transparent.
-float cut_below(const aiMaterial& source) {
-  aiString mode;
-  if (source.Get(AI_MATKEY_GLTF_ALPHAMODE, mode) != AI_SUCCESS || mode == aiString("OPAQUE")) return 0;
-  float cutoff = 0.5F;
-  if (mode == aiString("MASK")) source.Get(AI_MATKEY_GLTF_ALPHACUTOFF, cutoff);
-  return cutoff;
+  if (image) return image;
+  const auto bytes = read_file(path);
+  const std::string kind = bytes ? kind_of(*bytes) : std::string();
+  if (kind.find("which Limn does not read") != std::string::npos)
+    return error("{}: its texture cannot be read: {}: expected a PNG, JPEG or WebP image, found {}.",
+                 mesh_path.string(), path.string(), kind);
+  return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
 }
 
 // Gives holes the colour of the nearest opaque texel, because texture filtering mixes the two. False when the
@@ -96,80 +92,73 @@ bool spread_into_holes(float below, cv::Mat* bgra) {
   return true;
 }
 
-// Assimp's translation is for a rotation about the image's middle; glTF rotates about the upper left corner.
-TexturePlace place_of(const aiMaterial& source, aiTextureType type) {
-  TexturePlace out;
-  source.Get(AI_MATKEY_UVWSRC(type, 0), out.coordinates);
-  aiUVTransform of_middle;
-  if (source.Get(AI_MATKEY_UVTRANSFORM(type, 0), of_middle) != AI_SUCCESS) return out;
-  const Eigen::Vector2f scale(of_middle.mScaling.x, of_middle.mScaling.y);
-  const float c = std::cos(of_middle.mRotation), s = -std::sin(of_middle.mRotation);
-  const Eigen::Translation2f offset(of_middle.mTranslation.x - scale.x() / 2 * (1 - c + s),
-                                    1 - scale.y() - of_middle.mTranslation.y + scale.y() / 2 * (s + c - 1));
-  const Eigen::Affine2f v_down = Eigen::Translation2f(0, 1) * Eigen::Scaling(1.F, -1.F);
-  const Eigen::Rotation2Df turn(of_middle.mRotation);
-  out.moved = v_down * offset * turn * Eigen::Scaling(scale.x(), scale.y()) * v_down;
-  return out;
-}
-
 // The images that a file's materials name. Each is read once and shared.
 class Images {
  public:
-  Images(const aiScene& scene, const fs::path& path) : scene_(scene), path_(path) {}
+  Images(const MeshContent& content, const fs::path& path) : content_(content), path_(path) {}
 
   // Reads 8-bit BGR, or BGRA if the image has alpha and `with_alpha` is set.
-  Result<Texture> read(const aiString& name, bool with_alpha) {
-    const auto known = known_.find({name.C_Str(), with_alpha});
-    if (known != known_.end()) return known->second;
-    const aiTexture* embedded = scene_.GetEmbeddedTexture(name.C_Str());
-    const fs::path file = embedded ? path_ : texture_path(name.C_Str(), path_);
-    LIMN_TRY(cv::Mat image, embedded ? embedded_texture(*embedded, path_, with_alpha)
-                                     : texture_beside(file, path_, with_alpha));
+  Result<Texture> read(const TextureUse& use, bool with_alpha) {
+    const bool is_embedded = use.embedded >= 0;
+    const fs::path file = is_embedded ? path_ : path_of(use);
+    const auto key = std::make_tuple(file.string(), use.embedded, with_alpha);
+    if (const auto known = known_.find(key); known != known_.end()) return known->second;
+    const auto number = static_cast<std::size_t>(use.embedded);
+    if (is_embedded && number >= content_.images.size())
+      return error("{}: expected {} embedded images or more, found {}.", path_.string(), number + 1,
+                   content_.images.size());
+    LIMN_TRY(cv::Mat image, is_embedded ? embedded_texture(content_.images[number], path_, with_alpha)
+                                        : texture_beside(file, path_, with_alpha));
     if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
-    return known_[{name.C_Str(), with_alpha}] = Texture{image, file.string()};
+    return known_[key] = Texture{image, file.string()};
   }
 
  private:
-  const aiScene& scene_;
+  // The file that a texture's name means; where there is none, the name beside the mesh, for messages.
+  fs::path path_of(const TextureUse& use) const {
+    const fs::path beside = path_.parent_path();
+    for (const fs::path& folder : {use.folder.empty() ? beside : use.folder, beside}) {
+      const auto found = find_named_file(folder, use.name);
+      if (!found) continue;
+      if (found->is_other_case)
+        log_info("{}: names the texture {}; {} is used", path_.string(), use.name, found->path.string());
+      return found->path;
+    }
+    std::string slashes = percent_decoded(trimmed(use.name));
+    std::replace(slashes.begin(), slashes.end(), '\\', '/');
+    return beside / fs::path(slashes).filename();
+  }
+
+  const MeshContent& content_;
   const fs::path& path_;
-  std::map<std::pair<std::string, bool>, Texture> known_;
+  std::map<std::tuple<std::string, int, bool>, Texture> known_;
 };
 
 // Reads one material.
 class MaterialReader {
  public:
-  MaterialReader(const aiMaterial& source, std::string name, Images* images)
+  MaterialReader(const MaterialSource& source, std::string name, Images* images)
       : source_(source), place_(texture_place(source)), name_(std::move(name)), images_(*images) {}
 
-  Result<Material> read(bool is_gltf) {
+  Result<Material> read() {
     Material material;
-    aiColor4D colour(1, 1, 1, 1);
-    if (source_.Get(AI_MATKEY_BASE_COLOR, colour) == AI_SUCCESS ||
-        source_.Get(AI_MATKEY_COLOR_DIFFUSE, colour) == AI_SUCCESS) {
-      material.base_colour = {colour.r, colour.g, colour.b};
-    }
-    int shading = 0;
-    material.unlit =
-        source_.Get(AI_MATKEY_SHADING_MODEL, shading) == AI_SUCCESS && shading == aiShadingMode_Unlit;
-    source_.Get(AI_MATKEY_METALLIC_FACTOR, material.metallic);
-    source_.Get(AI_MATKEY_ROUGHNESS_FACTOR, material.roughness);
-    LIMN_TRY_STATUS(read_base_texture(colour.a, &material));
-    if (is_gltf) read_maps(&material);
+    material.base_colour = source_.base_colour;
+    material.unlit = source_.unlit;
+    material.metallic = source_.metallic;
+    material.roughness = source_.roughness;
+    LIMN_TRY_STATUS(read_base_texture(&material));
+    read_maps(&material);
     return material;
   }
 
  private:
-  // `alpha` multiplies the texture's alpha.
-  Status read_base_texture(float alpha, Material* material) {
-    const float below = cut_below(source_);
+  Status read_base_texture(Material* material) {
+    const float below = source_.cut_below, alpha = source_.alpha;
     const float texture_below = below > 0 ? below / std::max(alpha, 1e-6F) : 0;
-    for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
-      aiString name;
-      if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) continue;
-      LIMN_TRY(const Texture texture, images_.read(name, below > 0));
+    if (source_.base.is_there()) {
+      LIMN_TRY(const Texture texture, images_.read(source_.base, below > 0));
       material->texture = texture.image;
       material->texture_file = texture.file;
-      break;
     }
     if (below <= 0) return {};
     const bool has_alpha = material->texture.channels() == 4;
@@ -188,20 +177,18 @@ class MaterialReader {
 
   void read_maps(Material* material) {
     SurfaceMaps& maps = material->maps;
-    aiColor4D emitted(0, 0, 0, 1);
-    source_.Get(AI_MATKEY_COLOR_EMISSIVE, emitted);
-    material->emitted = {emitted.r, emitted.g, emitted.b};
-    maps.metallic_roughness = map_of(aiTextureType_UNKNOWN, "metallic-roughness texture",
+    material->emitted = source_.emitted;
+    maps.metallic_roughness = map_of(source_.metallic_roughness, "metallic-roughness texture",
                                      fmt::format("with metalness {} and roughness {} all over",
                                                  material->metallic, material->roughness))
                                   .value_or(Texture{});
-    maps.normals = map_of(aiTextureType_NORMALS, "normal texture", "smooth").value_or(Texture{});
+    maps.normals = map_of(source_.normals, "normal texture", "smooth").value_or(Texture{});
     maps.occlusion =
-        map_of(aiTextureType_LIGHTMAP, "occlusion texture", "in soft light everywhere").value_or(Texture{});
-    source_.Get(AI_MATKEY_GLTF_TEXTURE_SCALE(aiTextureType_NORMALS, 0), maps.normal_scale);
-    source_.Get(AI_MATKEY_GLTF_TEXTURE_STRENGTH(aiTextureType_LIGHTMAP, 0), maps.occlusion_strength);
+        map_of(source_.occlusion, "occlusion texture", "in soft light everywhere").value_or(Texture{});
+    maps.normal_scale = source_.normal_scale;
+    maps.occlusion_strength = source_.occlusion_strength;
     if (material->emitted.isZero()) return;
-    if (const auto emission = map_of(aiTextureType_EMISSIVE, "emissive texture", "without light of its own"))
+    if (const auto emission = map_of(source_.emission, "emissive texture", "without light of its own"))
       maps.emission = *emission;
     else
       material->emitted.setZero();
@@ -209,11 +196,10 @@ class MaterialReader {
 
   // A texture without an image when the material names none. Nullopt when the image cannot be read; a warning
   // then says how the material is shown (`instead`).
-  std::optional<Texture> map_of(aiTextureType type, const std::string& what, const std::string& instead) {
-    aiString name;
-    if (source_.GetTexture(type, 0, &name) != AI_SUCCESS || name.length == 0) return Texture{};
-    note_place(type, what);
-    auto texture = images_.read(name, false);
+  std::optional<Texture> map_of(const TextureUse& use, const std::string& what, const std::string& instead) {
+    if (!use.is_there()) return Texture{};
+    note_place(use, what);
+    auto texture = images_.read(use, false);
     if (texture) return std::move(texture).value();
     log_warning(
         "{}: expected a readable {}, found none ({}). The material is shown {}. Save the texture beside the "
@@ -223,8 +209,8 @@ class MaterialReader {
   }
 
   // Warns when a texture's mapping differs from the one that all textures of the material are shown with.
-  void note_place(aiTextureType type, const std::string& what) const {
-    const TexturePlace own = place_of(source_, type);
+  void note_place(const TextureUse& use, const std::string& what) const {
+    const TexturePlace& own = use.place;
     const bool is_moved = !own.moved.isApprox(place_.moved, 1e-5F);
     if (own.coordinates == place_.coordinates && !is_moved) return;
     log_warning(
@@ -236,7 +222,7 @@ class MaterialReader {
                                               : std::string("another KHR_texture_transform"));
   }
 
-  const aiMaterial& source_;
+  const MaterialSource& source_;
   TexturePlace place_;
   std::string name_;  // names of the file and the material, for messages
   Images& images_;
@@ -244,22 +230,27 @@ class MaterialReader {
 
 }  // namespace
 
-TexturePlace texture_place(const aiMaterial& material) {
-  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE, aiTextureType_UNKNOWN,
-                                   aiTextureType_NORMALS, aiTextureType_LIGHTMAP, aiTextureType_EMISSIVE})
-    if (material.GetTextureCount(type) > 0) return place_of(material, type);
+TexturePlace texture_place(const MaterialSource& material) {
+  for (const TextureUse* use : {&material.base, &material.metallic_roughness, &material.normals,
+                                &material.occlusion, &material.emission})
+    if (use->is_there()) return use->place;
   return {};
 }
 
-Result<std::vector<Material>> read_materials(const aiScene& scene, const fs::path& path, bool is_gltf) {
+Result<std::vector<Material>> read_materials(const MeshContent& content, const fs::path& path) {
   std::vector<Material> materials;
-  Images images(scene, path);
-  for (unsigned i = 0; i < scene.mNumMaterials; ++i) {
-    const aiMaterial& source = *scene.mMaterials[i];
-    const std::string own = source.GetName().C_Str();
-    const std::string name =
-        fmt::format("{}: material {}", path.string(), own.empty() ? std::to_string(i) : "'" + own + "'");
-    LIMN_TRY(Material material, MaterialReader(source, name, &images).read(is_gltf));
+  Images images(content, path);
+  std::vector<bool> is_used(content.materials.size(), false);
+  for (const MeshPiece& piece : content.pieces) is_used[piece.material] = true;
+  for (std::size_t i = 0; i < content.materials.size(); ++i) {
+    if (!is_used[i]) {  // its textures are not needed
+      materials.emplace_back();
+      continue;
+    }
+    const MaterialSource& source = content.materials[i];
+    const std::string name = fmt::format("{}: material {}", path.string(),
+                                         source.name.empty() ? std::to_string(i) : "'" + source.name + "'");
+    LIMN_TRY(Material material, MaterialReader(source, name, &images).read());
     materials.push_back(std::move(material));
   }
   return materials;

@@ -10,8 +10,8 @@
 #include <sstream>
 #include <string>
 
-#include "core/enum_names.h"
 #include "core/file.h"
+#include "scene/ply_file.h"
 
 namespace limn::scene {
 namespace {
@@ -36,149 +36,12 @@ std::string header_of(const ScanSurface& surface) {
   return text + "end_header\n";
 }
 
-// The type of a property's values.
-struct Type {
-  int size = 0;
-  bool real = false, sign = false;
-};
-
-Type type_of(const std::string& name) {
-  if (name == "char" || name == "int8") return {1, false, true};
-  if (name == "uchar" || name == "uint8") return {1, false, false};
-  if (name == "short" || name == "int16") return {2, false, true};
-  if (name == "ushort" || name == "uint16") return {2, false, false};
-  if (name == "int" || name == "int32") return {4, false, true};
-  if (name == "uint" || name == "uint32") return {4, false, false};
-  if (name == "float" || name == "float32") return {4, true, true};
-  if (name == "double" || name == "float64") return {8, true, true};
-  return {};
-}
-
-struct Property {
-  std::string name;
-  Type type, count_type;  // count_type.size > 0: a list
-};
-struct Element {
-  std::string name;
-  std::size_t count = 0;
-  std::vector<Property> properties;
-};
-enum class Format { ascii, little_endian, big_endian };
-constexpr EnumNames<Format, 3> k_formats{{"ascii", "binary_little_endian", "binary_big_endian"}};
-struct Header {
-  std::string format_name;
-  std::optional<Format> format;  // none: unknown
-  std::vector<Element> elements;
-  std::size_t bytes = 0;
-};
-
-// Reads a header line; false when it is not part of PLY.
-bool read_header_line(const std::string& line, Header* header) {
-  std::istringstream words(line);
-  std::string word;
-  if (!(words >> word) || word == "ply" || word == "comment" || word == "obj_info") return true;
-  if (word == "format") {
-    const bool is_there = static_cast<bool>(words >> header->format_name);
-    header->format = k_formats.find(header->format_name);
-    return is_there;
-  }
-  if (word == "element") {
-    Element element;
-    if (!(words >> element.name >> element.count)) return false;
-    header->elements.push_back(std::move(element));
-    return true;
-  }
-  if (word != "property" || header->elements.empty()) return false;
-  Property property;
-  std::string type;
-  words >> type;
-  if (type == "list") {
-    std::string count_type;
-    words >> count_type >> type;
-    property.count_type = type_of(count_type);
-    if (property.count_type.size == 0 || property.count_type.real) return false;
-  }
-  property.type = type_of(type);
-  words >> property.name;
-  header->elements.back().properties.push_back(property);
-  return property.type.size > 0 && !property.name.empty();
-}
-
-Result<Header> read_header(const std::string& bytes, const std::string& where) {
-  constexpr std::size_t k_longest = 100000;  // bytes; a header has only a few lines of text
-  const std::size_t end = bytes.substr(0, k_longest).find("end_header");
-  if (bytes.compare(0, 3, "ply") != 0 || end == std::string::npos)
-    return error("{}: expected a PLY file, found something else. Export the scan as PLY.", where);
-  Header header;
-  header.bytes = bytes.find('\n', end);
-  if (header.bytes == std::string::npos)
-    return error(
-        "{}: expected a line after the PLY header, found the end of the file. Copy or export it again.",
-        where);
-  ++header.bytes;
-  std::istringstream lines(bytes.substr(0, end));
-  for (std::string line; std::getline(lines, line);) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (!read_header_line(line, &header))
-      return error("{}: expected a line of a PLY header, found '{}'.", where, line);
-  }
-  return header;
-}
-
-// Reads the values one by one, in any format; `failed` is set when the file ends too early.
-class Values {
- public:
-  Values(const std::string& bytes, const Header& header)
-      : bytes_(bytes),
-        at_(header.bytes),
-        ascii_(header.format == Format::ascii),
-        swapped_(header.format == Format::big_endian) {}
-
-  double next(const Type& type) { return ascii_ ? next_word() : next_binary(type); }
-  bool failed() const { return failed_; }
-
- private:
-  double next_word() {
-    const char* begin = bytes_.c_str() + at_;
-    char* end = nullptr;
-    const double value = std::strtod(begin, &end);
-    failed_ |= end == begin;
-    at_ += static_cast<std::size_t>(end - begin);
-    return value;
-  }
-
-  template <class T>
-  static double as(const unsigned char* raw) {
-    T value;
-    std::memcpy(&value, raw, sizeof(T));
-    return static_cast<double>(value);
-  }
-
-  double next_binary(const Type& type) {
-    const auto size = static_cast<std::size_t>(type.size);
-    if (at_ + size > bytes_.size()) failed_ = true;
-    if (failed_) return 0;
-    unsigned char raw[8];
-    std::memcpy(raw, bytes_.data() + at_, size);
-    at_ += size;
-    if (swapped_) std::reverse(raw, raw + size);
-    if (type.real) return size == 4 ? as<float>(raw) : as<double>(raw);
-    if (size == 1) return type.sign ? as<std::int8_t>(raw) : as<std::uint8_t>(raw);
-    if (size == 2) return type.sign ? as<std::int16_t>(raw) : as<std::uint16_t>(raw);
-    return type.sign ? as<std::int32_t>(raw) : as<std::uint32_t>(raw);
-  }
-
-  const std::string& bytes_;
-  std::size_t at_;
-  bool ascii_, swapped_, failed_ = false;
-};
-
 // The destination of each property of a vertex; -1: ignored.
 enum Field { k_x, k_y, k_z, k_nx, k_ny, k_nz, k_stddev, k_red, k_green, k_blue, k_fields };
 constexpr const char* k_field_names[k_fields] = {"x",  "y",      "z",   "nx",    "ny",
                                                  "nz", "stddev", "red", "green", "blue"};
 
-std::array<int, k_fields> field_places(const Element& element) {
+std::array<int, k_fields> field_places(const PlyElement& element) {
   std::array<int, k_fields> places;
   places.fill(-1);
   for (std::size_t i = 0; i < element.properties.size(); ++i)
@@ -188,13 +51,13 @@ std::array<int, k_fields> field_places(const Element& element) {
   return places;
 }
 
-void read_vertices(const Element& element, double metres, Values* values, ScanSurface* surface) {
+void read_vertices(const PlyElement& element, double metres, PlyValues* values, ScanSurface* surface) {
   const auto place = field_places(element);
   const bool normals = place[k_nx] >= 0 && place[k_ny] >= 0 && place[k_nz] >= 0;
   std::vector<double> row(element.properties.size());
   for (std::size_t i = 0; i < element.count && !values->failed(); ++i) {
     for (std::size_t p = 0; p < row.size(); ++p) {
-      const Property& property = element.properties[p];
+      const PlyProperty& property = element.properties[p];
       if (property.count_type.size == 0)
         row[p] = values->next(property.type);
       else
@@ -216,9 +79,9 @@ void read_vertices(const Element& element, double metres, Values* values, ScanSu
 }
 
 // Reads the faces; false when an index is beyond the vertices.
-bool read_faces(const Element& element, std::size_t vertices, Values* values, ScanSurface* surface) {
+bool read_faces(const PlyElement& element, std::size_t vertices, PlyValues* values, ScanSurface* surface) {
   for (std::size_t i = 0; i < element.count && !values->failed(); ++i) {
-    for (const Property& property : element.properties) {
+    for (const PlyProperty& property : element.properties) {
       if (property.count_type.size == 0) {
         values->next(property.type);
         continue;
@@ -238,9 +101,9 @@ bool read_faces(const Element& element, std::size_t vertices, Values* values, Sc
   return true;
 }
 
-void skip(const Element& element, Values* values) {
+void skip(const PlyElement& element, PlyValues* values) {
   for (std::size_t i = 0; i < element.count && !values->failed(); ++i)
-    for (const Property& property : element.properties)
+    for (const PlyProperty& property : element.properties)
       for (double n = property.count_type.size ? values->next(property.count_type) : 1;
            n > 0 && !values->failed(); --n)
         values->next(property.type);
@@ -287,12 +150,10 @@ Status save_ply(const ScanSurface& surface, const std::filesystem::path& path) {
 Result<ScanSurface> load_ply(const std::filesystem::path& path, double metres_per_unit) {
   LIMN_TRY(const std::string bytes, read_file(path));
   const std::string where = path.string();
-  LIMN_TRY(const Header header, read_header(bytes, where));
-  if (!header.format)
-    return error("{}: expected PLY format ascii or binary, found '{}'.", where, header.format_name);
+  LIMN_TRY(const PlyHeader header, read_ply_header(bytes, where));
   ScanSurface surface;
-  Values values(bytes, header);
-  for (const Element& element : header.elements) {
+  PlyValues values(bytes, header);
+  for (const PlyElement& element : header.elements) {
     if (element.name == "vertex")
       read_vertices(element, metres_per_unit, &values, &surface);
     else if (element.name != "face")

@@ -16,6 +16,8 @@
 #include "core/utf8.h"
 #include "scene/actions.h"
 #include "scene/marker_file.h"
+#include "scene/mesh_content.h"
+#include "scene/slot_folder.h"
 
 namespace limn::scene {
 namespace {
@@ -26,7 +28,7 @@ namespace fs = std::filesystem;
 struct MeshFile {
   std::string where;
   fs::path path;
-  LengthUnit units = LengthUnit::metre;
+  std::optional<LengthUnit> units;  // absent: the file's own
 };
 
 struct Reader {
@@ -58,7 +60,9 @@ MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
 
 MeshFile read_mesh_file(const ConfigNode& node) {
   const ConfigNode mesh = node.at("mesh");
-  return {mesh.where(), mesh.path_inside(), k_length_units.read(node.at("units"))};
+  MeshFile file{mesh.where(), mesh.path_inside(), {}};
+  if (node.find("units") || !states_unit(file.path)) file.units = k_length_units.read(node.at("units"));
+  return file;
 }
 
 double read_size_m(const ConfigNode& node) { return node.at("size_mm").positive(k_largest_marker_mm) * 1e-3; }
@@ -233,13 +237,14 @@ std::vector<Viewer> read_viewers(const ConfigNode& node, const Scene& scene) {
 }
 
 // An object much too small or large for a prototype was most likely drawn in another unit.
-Status check_size(const Mesh& mesh, LengthUnit units) {
+Status check_size(const Mesh& mesh, std::optional<LengthUnit> given) {
   constexpr double k_smallest_m = 1e-3, k_largest_m = 20;
   constexpr double k_likely_from_m = 0.02, k_likely_to_m = 6;
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& p : mesh.positions) box.extend(p);
   const double size_m = box.diagonal().cast<double>().norm();
   if (size_m >= k_smallest_m && size_m <= k_largest_m) return {};
+  const LengthUnit units = given.value_or(LengthUnit::metre);
   const double in_file = size_m / metres_per_unit(units);
   std::vector<std::string> likely;
   for (const LengthUnit unit : {LengthUnit::millimetre, LengthUnit::centimetre, LengthUnit::metre,
@@ -249,7 +254,8 @@ Status check_size(const Mesh& mesh, LengthUnit units) {
       likely.push_back(fmt::format("{} ({:.3g} m)", to_text(unit), as_m));
   }
   return error(
-      "expected an object of 1 mm to 20 m, found {:.3g} m across in units \"{}\". {}", size_m, to_text(units),
+      "expected an object of 1 mm to 20 m, found {:.3g} m across in {}. {}", size_m,
+      given ? "units \"" + to_text(units) + "\"" : "the unit that the file states",
       likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
@@ -285,10 +291,8 @@ double longest_side(const Mesh& mesh) {
   return static_cast<double>(box.sizes().maxCoeff());
 }
 
-// A guess of a mesh's unit: glTF is in metres; for other formats the first unit that gives a part's usual
-// size.
-LengthUnit guessed_units(const fs::path& path, const Mesh& as_metres) {
-  if (path.extension() == ".glb" || path.extension() == ".gltf") return LengthUnit::metre;
+// A guess of a mesh's unit: the first one that gives a part's usual size.
+LengthUnit guessed_units(const Mesh& as_metres) {
   constexpr double k_least_m = 0.01, k_most_m = 3;
   for (const LengthUnit units :
        {LengthUnit::millimetre, LengthUnit::centimetre, LengthUnit::metre, LengthUnit::inch}) {
@@ -296,6 +300,12 @@ LengthUnit guessed_units(const fs::path& path, const Mesh& as_metres) {
     if (size >= k_least_m && size <= k_most_m) return units;
   }
   return LengthUnit::metre;
+}
+
+// A mesh whose coordinates were taken as metres, in its guessed unit.
+Mesh scaled(Mesh mesh, LengthUnit units) {
+  for (Eigen::Vector3f& p : mesh.positions) p *= static_cast<float>(metres_per_unit(units));
+  return mesh;
 }
 
 // The units that people have given, by variant.
@@ -312,69 +322,87 @@ Result<std::map<std::string, LengthUnit>> load_units(const fs::path& file) {
 }
 
 // Imports a mesh from a slot's folder; `known_units` has the units that people have given, by variant.
-Result<Variant> auto_import_meshes(const fs::path& file,
-                                   const Slot& slot,
-                                   const std::map<std::string, LengthUnit>& known_units) {
+Result<Variant> auto_import_mesh(const fs::path& file,
+                                 const Slot& slot,
+                                 std::span<const Variant> variants,
+                                 const std::map<std::string, LengthUnit>& known_units) {
   const std::string name = file.stem().string();
   if (!is_utf8(name))
     return error("{}: expected a file name in UTF-8, found other bytes. Rename the file.",
                  as_utf8(file.string()));
-  if (find_named(slot.variants, name))
+  if (find_named(slot.variants, name) || find_named(variants, name))
     return error(
         "{}: expected a file name that no other variant of slot '{}' has, found '{}' twice. Rename the file.",
         file.string(), slot.name, name);
-  LIMN_TRY(const Mesh as_metres, load_mesh(file, LengthUnit::metre));
   const auto known = known_units.find(name);
-  const bool is_guess = known == known_units.end();
-  const LengthUnit units = is_guess ? guessed_units(file, as_metres) : known->second;
-  LIMN_TRY(Mesh mesh, load_mesh(file, units));
-  if (const Status size = check_size(mesh, units); !size)
+  Variant::AutoImported import{std::nullopt, false};
+  if (known != known_units.end()) import.units = known->second;
+  import.is_guess = !import.units && !states_unit(file);
+  LIMN_TRY(Mesh mesh, load_mesh(file, import.is_guess ? LengthUnit::metre : import.units));
+  if (import.is_guess) import.units = guessed_units(mesh);
+  if (import.is_guess) mesh = scaled(std::move(mesh), *import.units);
+  if (const Status size = check_size(mesh, import.units); !size)
     return error("{}: {}", file.string(), size.message());
-  Variant variant{name, std::move(mesh), Variant::AutoImported{units, is_guess}};
-  if (is_guess) log_info("{}", units_question(slot, variant));
+  Variant variant{name, std::move(mesh), import};
+  if (import.is_guess) log_info("{}", units_question(slot, variant));
   return variant;
 }
+
+// What is left out of a scene: variants that cannot be loaded, and files that are none.
+struct LeftOut {
+  std::vector<SkippedVariant> variants, others;
+};
 
 // Loads the variants that scene.json lists, and the meshes in slots/NAME/.
 Status load_variants(std::span<const MeshFile> listed,
                      const fs::path& path,
                      const fs::path& scene_folder,
                      Slot* slot,
-                     std::vector<SkippedVariant>* skipped_variants) {
+                     LeftOut* left_out) {
   std::vector<Variant> variants;
-  const auto leave_out = [&](const std::string& name, const Error& why) -> Status {
-    if (!skipped_variants) return why;
-    skipped_variants->push_back({slot->name, name, why.message});
-    return {};
-  };
   for (std::size_t i = 0; i < listed.size(); ++i) {
     auto mesh = load_named_mesh(listed[i], path);
     if (mesh)
       variants.push_back({slot->variants[i].name, std::move(*mesh)});
     else
-      LIMN_TRY_STATUS(leave_out(slot->variants[i].name, mesh.error()));
+      left_out->variants.push_back({slot->name, slot->variants[i].name, mesh.message(), i == 0});
   }
-  std::error_code none;
-  std::set<fs::path> files;
-  LIMN_TRY(const auto known_units, load_units(scene_folder / "slots" / slot->name / "units.json"));
-  for (const auto& entry : fs::directory_iterator(scene_folder / "slots" / slot->name, none))
-    for (const char* end : {".glb", ".gltf", ".obj", ".stl", ".ply"})
-      if (entry.path().extension() == end) files.insert(entry.path());
-  for (const fs::path& file : files) {
-    auto variant = auto_import_meshes(file, *slot, known_units);
+  const fs::path folder = scene_folder / "slots" / slot->name;
+  LIMN_TRY(const auto known_units, load_units(folder / "units.json"));
+  const SlotFolder files = list_slot_folder(folder);
+  for (const fs::path& file : files.meshes) {
+    auto variant = auto_import_mesh(file, *slot, variants, known_units);
     if (variant)
       variants.push_back(std::move(*variant));
     else
-      LIMN_TRY_STATUS(leave_out(as_utf8(file.stem().string()), variant.error()));
+      left_out->variants.push_back({slot->name, as_utf8(file.stem().string()), variant.message()});
   }
+  for (const SlotFolder::Other& other : files.others)
+    left_out->others.push_back({slot->name, as_utf8(other.path.filename().string()),
+                                as_utf8(other.path.string()) + ": " + other.why});
   slot->variants = std::move(variants);
   return {};
 }
 
-Status load_files(const Reader& reader,
-                  const fs::path& path,
-                  Scene* scene,
-                  std::vector<SkippedVariant>* skipped_variants) {
+// What lies in slots/ itself, and folders there that no slot is named after.
+void find_strays(const Scene& scene, LeftOut* left_out) {
+  const fs::path slots = scene.folder / "slots";
+  const std::string names = joined_names(scene.slots);
+  for (const fs::path& mesh : list_slot_folder(slots).meshes)
+    left_out->others.push_back(
+        {"(none)", as_utf8(mesh.filename().string()),
+         fmt::format("{}: expected meshes in a slot's folder ({}), found one beside them. Move it there.",
+                     as_utf8(mesh.string()), names)});
+  for (const SlotFolder::Other& other : list_slot_folder(slots).others)
+    if (std::error_code none;
+        fs::is_directory(other.path, none) && !scene.find_slot(other.path.filename().string()))
+      left_out->others.push_back(
+          {"(none)", as_utf8(other.path.filename().string()),
+           fmt::format("{}: expected a folder named after a slot ({}), found another name. Rename it.",
+                       as_utf8(other.path.string()), names)});
+}
+
+Status load_files(const Reader& reader, const fs::path& path, Scene* scene, LeftOut* left_out) {
   if (scene->prototype) {
     LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
     for (Material& material : scene->prototype->mesh.materials)
@@ -387,13 +415,9 @@ Status load_files(const Reader& reader,
   for (Slot& slot : scene->slots) {
     const auto own = listed.first(slot.variants.size());
     listed = listed.subspan(own.size());
-    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, &slot, skipped_variants));
+    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, &slot, left_out));
   }
-  std::erase_if(scene->controls, [&](const Control& control) {
-    const Slot* slot = scene->find_slot(control.slot);
-    return slot && slot->variants.empty();
-  });
-  std::erase_if(scene->slots, [](const Slot& slot) { return slot.variants.empty(); });
+  find_strays(*scene, left_out);
   return {};
 }
 
@@ -410,7 +434,21 @@ const Viewer* Scene::find_tablet(const std::string& guest) const {
 
 const Slot* Scene::find_slot(const std::string& name) const { return find_named(slots, name); }
 
-Result<Scene> load_scene(const fs::path& path, std::vector<SkippedVariant>* skipped_variants) {
+std::string to_text(const SkippedVariant& skipped) {
+  return fmt::format("{} of slot {} is left out: {}", skipped.variant, skipped.slot, skipped.why);
+}
+
+void leave_out_empty_slots(Scene* scene) {
+  std::erase_if(scene->controls, [&](const Control& control) {
+    const Slot* slot = scene->find_slot(control.slot);
+    return slot && slot->variants.empty();
+  });
+  std::erase_if(scene->slots, [](const Slot& slot) { return slot.variants.empty(); });
+}
+
+Result<Scene> load_scene(const fs::path& path,
+                         std::vector<SkippedVariant>* skipped_variants,
+                         EmptySlots empty_slots) {
   std::error_code code;
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
@@ -427,7 +465,20 @@ Result<Scene> load_scene(const fs::path& path, std::vector<SkippedVariant>* skip
   if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
   if (const auto node = root.find("light")) scene.light = read_room_light(*node);
   LIMN_TRY_STATUS(config.status());
-  LIMN_TRY_STATUS(load_files(reader, file, &scene, skipped_variants));
+  LeftOut left_out;
+  LIMN_TRY_STATUS(load_files(reader, file, &scene, &left_out));
+  if (!skipped_variants && !left_out.variants.empty()) return error("{}", left_out.variants[0].why);
+  if (empty_slots == EmptySlots::left_out) leave_out_empty_slots(&scene);
+  for (const auto& list : {left_out.variants, left_out.others})
+    for (const SkippedVariant& skipped : list)
+      skipped_variants ? skipped_variants->push_back(skipped) : log_warning("{}", to_text(skipped));
+  return scene;
+}
+
+Result<Scene> load_usable_scene(const fs::path& path) {
+  std::vector<SkippedVariant> skipped_variants;
+  LIMN_TRY(Scene scene, load_scene(path, &skipped_variants));
+  for (const SkippedVariant& skipped : skipped_variants) log_warning("{}", to_text(skipped));
   return scene;
 }
 
@@ -435,15 +486,15 @@ std::string units_question(const Slot& slot, const Variant& variant) {
   if (!variant.auto_imported || !variant.auto_imported->is_guess) return {};
   return fmt::format(
       "{} of slot '{}' is assumed to be in {}, {:.0f} mm long. Is that right? If not: units {} {} UNIT",
-      variant.name, slot.name, to_text(variant.auto_imported->units), 1e3 * longest_side(variant.mesh),
+      variant.name, slot.name, to_text(*variant.auto_imported->units), 1e3 * longest_side(variant.mesh),
       slot.name, variant.name);
 }
 
 std::string units_json(const Slot& slot, const std::string& variant, LengthUnit units) {
   nlohmann::ordered_json all = nlohmann::ordered_json::object();
   for (const Variant& known : slot.variants)
-    if (known.auto_imported && !known.auto_imported->is_guess)
-      all[known.name] = to_text(known.auto_imported->units);
+    if (known.auto_imported && !known.auto_imported->is_guess && known.auto_imported->units)
+      all[known.name] = to_text(*known.auto_imported->units);
   all[variant] = to_text(units);
   return json_text(nlohmann::ordered_json({{"schema", "limn.units/1"}, {"units", all}}), 2) + "\n";
 }

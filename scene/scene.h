@@ -33,8 +33,8 @@ enum class Mode {
 struct Variant {
   /// A mesh whose file people put into the slot's folder.
   struct AutoImported {
-    LengthUnit units = LengthUnit::metre;
-    bool is_guess = true;  ///< Whether the unit is a guess, not a person's answer.
+    std::optional<LengthUnit> units = LengthUnit::metre;  ///< Absent: the unit that the file states.
+    bool is_guess = true;  ///< Whether the unit is a guess, neither a person's answer nor the file's.
   };
   std::string name;
   Mesh mesh;
@@ -87,17 +87,32 @@ struct Scene {
   const Viewer* find_tablet(const std::string& guest) const;
 };
 
-/// A variant whose mesh cannot be loaded, and why.
+/// What is left out of a scene, and why: a variant whose mesh cannot be loaded, or (named by its whole file
+/// name) something in slots/ that is no variant.
 struct SkippedVariant {
   std::string slot, variant, why;
+  bool is_first = false;  ///< Whether the slot would show it at first.
 };
+/// "VARIANT of slot SLOT is left out: WHY"
+std::string to_text(const SkippedVariant& skipped);
+
+/// Whether slots of which no variant can be loaded stay in the scene.
+enum class EmptySlots { left_out, kept };
 
 /// Reads a scene; `path` is the scene.json or its folder. Meshes in slots/NAME/ of the folder become variants
-/// of slot NAME, named after their files. Their units come from slots/NAME/units.json (limn.units/1) or are
-/// guessed, with a message. A variant that cannot be loaded is an error. With `skipped_variants` it is
-/// instead left out and listed there; a slot without any variant is then left out with its controls.
+/// of slot NAME, named after their files. Their units are those of slots/NAME/units.json (limn.units/1), or
+/// those that the files state, or are guessed, with a message. A variant that cannot be loaded is an error.
+/// With `skipped_variants` it is instead left out and listed there; a slot without any variant is then left
+/// out with its controls. What is no variant in slots/ is listed there, too, or else reported as a warning.
 Result<Scene> load_scene(const std::filesystem::path& path,
-                         std::vector<SkippedVariant>* skipped_variants = nullptr);
+                         std::vector<SkippedVariant>* skipped_variants = nullptr,
+                         EmptySlots empty_slots = EmptySlots::left_out);
+
+/// As load_scene; what is left out is reported as warnings.
+Result<Scene> load_usable_scene(const std::filesystem::path& path);
+
+/// Removes the slots without variants, and their controls.
+void leave_out_empty_slots(Scene* scene);
 
 /// A question for people about an auto-imported variant whose unit is a guess, with the way to answer it;
 /// empty for other variants.

@@ -98,6 +98,7 @@ void add_tangents(Mesh* mesh, std::span<const Vector4f> of_corners) {
       mesh->positions.push_back(Vector3f(mesh->positions[vertex]));
       mesh->normals.push_back(Vector3f(mesh->normals[vertex]));
       mesh->uvs.push_back(Eigen::Vector2f(mesh->uvs[vertex]));
+      if (!mesh->colours.empty()) mesh->colours.push_back(Eigen::Vector3f(mesh->colours[vertex]));
       mesh->tangents.push_back(t);
     }
     vertex = other->second;

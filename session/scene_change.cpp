@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/gesture.h"
+#include "core/names.h"
 #include "scene/actions.h"
 
 namespace limn::session {
@@ -48,14 +49,24 @@ Status check_same_markers(const scene::Scene& now, const scene::Scene& next) {
       (next.folder / "scene.json").string());
 }
 
-Status check_all_loaded(const scene::Scene& now, const LoadedScene& loaded) {
-  for (const scene::SkippedVariant& skipped : loaded.skipped_variants) {
-    const scene::Slot* slot = now.find_slot(skipped.slot);
-    if (!slot) continue;
-    for (const std::string& name : variant_names(*slot))
-      if (name == skipped.variant) return error("{}", skipped.why);
+std::vector<scene::SkippedVariant> keep_old_variants(const scene::Scene& now, LoadedScene* loaded) {
+  std::vector<scene::SkippedVariant> kept, left_out;
+  for (const scene::SkippedVariant& skipped : loaded->skipped_variants) {
+    const scene::Slot* before = now.find_slot(skipped.slot);
+    scene::Slot* slot = find_named(loaded->scene.slots, skipped.slot);
+    const scene::Variant* old = before ? find_named(before->variants, skipped.variant) : nullptr;
+    if (!slot || !old || find_named(slot->variants, skipped.variant)) {
+      left_out.push_back(skipped);
+      continue;
+    }
+    const auto place =
+        std::min(old - before->variants.data(), static_cast<std::ptrdiff_t>(slot->variants.size()));
+    slot->variants.insert(slot->variants.begin() + place, *old);
+    kept.push_back(skipped);
   }
-  return {};
+  loaded->skipped_variants = std::move(left_out);
+  scene::leave_out_empty_slots(&loaded->scene);
+  return kept;
 }
 
 scene::ShowState with_variants_of(const scene::Scene& next,

@@ -14,8 +14,9 @@ namespace limn::session {
 /// bodies, and the same controls. Error: what is different, and what to do.
 Status check_same_markers(const scene::Scene& now, const scene::Scene& next);
 
-/// Error: a variant that `now` has can no longer be loaded. A variant that never could be loaded is no error.
-Status check_all_loaded(const scene::Scene& now, const LoadedScene& loaded);
+/// Gives each variant that `now` has and that can no longer be loaded its old mesh, and moves it from
+/// `loaded`'s list to the result. Slots that then have no variant are left out.
+std::vector<scene::SkippedVariant> keep_old_variants(const scene::Scene& now, LoadedScene* loaded);
 
 /// The show state for the scene `next`: a new variant of a slot is shown at once, and a variant that is gone
 /// is replaced by the slot's first.

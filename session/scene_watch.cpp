@@ -50,7 +50,7 @@ std::optional<Result<LoadedScene>> SceneWatch::take_changed_scene() {
   loaded_ = seen_;
   loading_ = std::async(std::launch::async, [folder = folder_]() -> Result<LoadedScene> {
     LoadedScene loaded;
-    LIMN_TRY(loaded.scene, scene::load_scene(folder, &loaded.skipped_variants));
+    LIMN_TRY(loaded.scene, scene::load_scene(folder, &loaded.skipped_variants, scene::EmptySlots::kept));
     return loaded;
   });
   return std::nullopt;

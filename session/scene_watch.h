@@ -14,7 +14,7 @@
 
 namespace limn::session {
 
-/// A scene as its files are now, and the variants that cannot be loaded.
+/// A scene as its files are now, with slots that have no variants, and what is left out.
 struct LoadedScene {
   scene::Scene scene;
   std::vector<scene::SkippedVariant> skipped_variants;

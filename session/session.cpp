@@ -20,14 +20,6 @@ scene::Edit edit_of(const scene::Control& control, int steps) {
 
 }  // namespace
 
-void report_skipped(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry) {
-  for (const scene::SkippedVariant& part : skipped_variants) {
-    const std::string what = fmt::format("{} of slot {} is left out: {}", part.variant, part.slot, part.why);
-    if (telemetry) telemetry->note(at, what);
-    log_warning("live: {}", what);
-  }
-}
-
 Result<Session> Session::create(const SessionSetup& setup,
                                 Telemetry* telemetry,
                                 Recorder* recorder,
@@ -148,10 +140,18 @@ Status Session::replace_rig(Rig rig, Stamp at) {
 void Session::reload_changed_scene(SceneWatch* files, Stamp at) {
   auto changed = files->take_changed_scene();
   if (!changed) return;
-  Status done = *changed ? check_all_loaded(setup_.scene, **changed) : Status(changed->error());
-  if (done) done = replace_scene(std::move((*changed)->scene), at);
-  if (done) return report_skipped((*changed)->skipped_variants, at, telemetry_);
-  warn(at, done.message() + " The parts stay as they were.");
+  if (!*changed) return warn(at, changed->message() + " The parts stay as they were.");
+  const std::vector<scene::SkippedVariant> kept = keep_old_variants(setup_.scene, &**changed);
+  const Status done = replace_scene(std::move((*changed)->scene), at);
+  if (!done) return warn(at, done.message() + " The parts stay as they were.");
+  for (const scene::SkippedVariant& old : kept)
+    warn(at, fmt::format("{} of slot {} stays as it was: {}", old.variant, old.slot, old.why));
+  report_skipped((*changed)->skipped_variants, at);
+}
+
+void Session::report_skipped(std::span<const scene::SkippedVariant> skipped_variants, Stamp at) {
+  for (const scene::SkippedVariant& skipped : skipped_variants)
+    if (const std::string what = scene::to_text(skipped); left_out_.insert(what).second) warn(at, what);
 }
 
 FrameInput Session::predict(const FrameTimes& times) {

@@ -39,9 +39,6 @@ struct Edited {
   std::size_t count = 0;  ///< number of edits applied so far, with this one
 };
 
-/// Reports variants that could not be loaded. `telemetry` may be null.
-void report_skipped(std::span<const scene::SkippedVariant> skipped_variants, Stamp at, Telemetry* telemetry);
-
 /// A live session: makes images from percepts and from what people change. Belongs to the thread whose GL
 /// context is current.
 class Session {
@@ -88,6 +85,8 @@ class Session {
   /// Shows the scene from `files` if it has changed, as replace_scene() does. If it cannot be loaded, this is
   /// reported and the parts stay as they were.
   void reload_changed_scene(SceneWatch* files, Stamp at);
+  /// Reports what is left out of the scene, each once.
+  void report_skipped(std::span<const scene::SkippedVariant> skipped_variants, Stamp at);
 
   /// The input for the frame with these times. Bodies are predicted to them here and nowhere else.
   FrameInput predict(const FrameTimes& times);
@@ -137,7 +136,8 @@ class Session {
   ShowStore store_;
   Telemetry* telemetry_;
   Recorder* recorder_;
-  std::set<std::string> asked_;  // questions about units, each asked once
+  std::set<std::string> left_out_;  // what report_skipped() has reported
+  std::set<std::string> asked_;     // questions about units, each asked once
   scene::ShowState show_state_;
   Percepts percepts_;
   Prediction prediction_;

@@ -12,11 +12,23 @@ struct SurfaceMaterial {
                             // yet turned to the viewer
 };
 
+// The colour of the mesh's corners, linear light, interpolated. It is read only if VERTEX_COLOURS is defined, as
+// with the maps.
+vec3 vertex_colour(Hit hit, Material material) {
+#ifdef VERTEX_COLOURS
+  if (material.more.w == 0) return vec3(1);
+  uint first = 3u * (hit.id - 1u) + uint(material.more.z);
+  return mat3(normal(first).rgb, normal(first + 1u).rgb, normal(first + 2u).rgb) * clamp(hit.weights, 0.0, 1.0);
+#else
+  return vec3(1);
+#endif
+}
+
 // Base colour at a hit; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 base_colour(Hit hit, float footprint) {
   Material material = s_materials[material_of(hit.id)];
   vec4 wanted = owner_at(owner_of(hit.id)).colour;
-  vec3 colour = wanted.a > 0.5 ? wanted.rgb : material.colour.rgb;
+  vec3 colour = (wanted.a > 0.5 ? wanted.rgb : material.colour.rgb) * vertex_colour(hit, material);
   if (material.parameters.x < 0.0) return colour;
   vec2 uv = uv_of(hit);
   vec3 at = vec3(uv.x, 1.0 - uv.y, material.parameters.x);

@@ -24,7 +24,8 @@ struct Material {
   vec4 maps;    // layers of s_maps, or -1: occlusion, roughness and metalness (x); normals (y); scale of the
                 // normals' x and y (z); strength of the occlusion (w)
   ivec4 more;   // x: offset from a corner's number to its tangent in s_normals (the tangent's w is its
-                // handedness); y: 1 when there is a map of roughness and metalness
+                // handedness); y: 1 when there is a map of roughness and metalness; z: offset to the corner's
+                // colour, likewise; w: 1 when corners have colours
 };
 layout(std430, binding = k_materials_buffer) readonly buffer Materials { Material s_materials[]; };
 // Colour textures, one in each layer; sRGB is decoded on reading.

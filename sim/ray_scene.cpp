@@ -217,4 +217,12 @@ Eigen::Vector2f RayScene::uv(const Hit& hit) const {
   return (1 - u - v) * uvs[c[0]] + u * uvs[c[1]] + v * uvs[c[2]];
 }
 
+Eigen::Vector3f RayScene::colour(const Hit& hit) const {
+  const auto& colours = impl_->placed[static_cast<std::size_t>(hit.object)].mesh->colours;
+  if (colours.empty()) return Eigen::Vector3f::Ones();
+  const auto& c = impl_->corners(hit);
+  const float u = hit.barycentric.x(), v = hit.barycentric.y();
+  return (1 - u - v) * colours[c[0]] + u * colours[c[1]] + v * colours[c[2]];
+}
+
 }  // namespace limn::sim

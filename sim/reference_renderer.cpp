@@ -136,8 +136,8 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
                                                   const Nearest& nearest,
                                                   const PartsLight& light) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial material =
-      surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  const SurfaceMaterial material = surface_material(*part.mesh, nearest.hit.triangle,
+                                                    part.rays.uv(nearest.hit), part.rays.colour(nearest.hit));
   if (material.is_unlit) return material.base.cast<float>();
   const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
   const double side = part.rays.shading_normal(nearest.hit).dot(face) < 0 ? -1 : 1;
@@ -150,8 +150,8 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
 Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
                                                        const Eigen::Vector3d& d_normal) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial material =
-      surface_material(*part.mesh, nearest.hit.triangle, part.rays.uv(nearest.hit));
+  const SurfaceMaterial material = surface_material(*part.mesh, nearest.hit.triangle,
+                                                    part.rays.uv(nearest.hit), part.rays.colour(nearest.hit));
   if (material.is_unlit) return material.base.cast<float>();
   const double side = part.rays.shading_normal(nearest.hit).dot(d_normal) < 0 ? -1 : 1;
   const Eigen::Vector3d n =

@@ -80,18 +80,24 @@ bool is_cut_out(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv
   return between_texels(material.texture, uv, alpha_of_texel) < material.cut_below;
 }
 
-Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
+Eigen::Vector3f material_albedo(const scene::Mesh& mesh,
+                                int triangle,
+                                const Eigen::Vector2f& uv,
+                                const Eigen::Vector3f& colour_rgb) {
   const scene::Material& material = material_of(mesh, triangle);
-  const Eigen::Vector3f bgr = material.base_colour.reverse();
+  const Eigen::Vector3f bgr = material.base_colour.cwiseProduct(colour_rgb).reverse();
   if (material.texture.empty()) return bgr;
   return bgr.cwiseProduct(between_texels(material.texture, uv, repeated_texel));
 }
 
-SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
+SurfaceMaterial surface_material(const scene::Mesh& mesh,
+                                 int triangle,
+                                 const Eigen::Vector2f& uv,
+                                 const Eigen::Vector3f& colour_rgb) {
   const scene::Material& material = material_of(mesh, triangle);
   const scene::SurfaceMaps& maps = material.maps;
   SurfaceMaterial found;
-  found.base = material_albedo(mesh, triangle, uv).cast<double>();
+  found.base = material_albedo(mesh, triangle, uv, colour_rgb).cast<double>();
   found.is_unlit = material.unlit;
   found.metallic = static_cast<double>(material.metallic);
   found.roughness = static_cast<double>(material.roughness);

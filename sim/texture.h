@@ -15,8 +15,11 @@ Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool
 bool is_cut_out(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 
 /// Linear BGR of a mesh's own material at a place of a triangle. Textures repeat beyond their borders, as in
-/// glTF.
-Eigen::Vector3f material_albedo(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
+/// glTF. `colour_rgb`: the mesh's colour there (RayScene::colour).
+Eigen::Vector3f material_albedo(const scene::Mesh& mesh,
+                                int triangle,
+                                const Eigen::Vector2f& uv,
+                                const Eigen::Vector3f& colour_rgb);
 
 /// The glTF 2.0 material at a place of a triangle, with textures and factors multiplied.
 struct SurfaceMaterial {
@@ -29,6 +32,9 @@ struct SurfaceMaterial {
   Eigen::Vector3d along;  ///< Normal from the normal map: components along tangent, bitangent and the mesh's
                           ///< normal; not of unit length.
 };
-SurfaceMaterial surface_material(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
+SurfaceMaterial surface_material(const scene::Mesh& mesh,
+                                 int triangle,
+                                 const Eigen::Vector2f& uv,
+                                 const Eigen::Vector3f& colour_rgb = Eigen::Vector3f::Ones());
 
 }  // namespace limn::sim

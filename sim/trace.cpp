@@ -110,7 +110,7 @@ class Tracer {
     if (back) s.n_face = -s.n_face, s.n = -s.n;
     s.albedo = object.albedo.cast<float>();
     if (object.by_material)
-      s.albedo = material_albedo(*object.mesh, hit.triangle, scene_.uv(hit));
+      s.albedo = material_albedo(*object.mesh, hit.triangle, scene_.uv(hit), scene_.colour(hit));
     else if (!object.texture.empty() && !(back && object.sharp_texture)) {
       const Eigen::Vector3f share = textured(object.texture, scene_.uv(hit), object.sharp_texture);
       const auto ink = static_cast<float>(object.ink_albedo);

@@ -387,7 +387,9 @@ Result<World> load_world(const std::filesystem::path& path,
   }
   LIMN_TRY_STATUS(config.status());
   if (!scene_folder.empty()) {
-    LIMN_TRY(world.scene, scene::load_scene(scene_folder.lexically_normal(), skipped_variants));
+    const std::filesystem::path folder = scene_folder.lexically_normal();
+    LIMN_TRY(world.scene, skipped_variants ? scene::load_scene(folder, skipped_variants)
+                                           : scene::load_usable_scene(folder));
     LIMN_TRY_STATUS(add_scene(world, places, marker_image, paper, path.string()));
   }
   for (const LoosePlace& place : loose)

@@ -107,7 +107,7 @@ using MarkerImage = std::function<Result<MarkerDrawing>(const MarkerName&)>;
 
 /// Reads a limn.world/1 file and the scene that it names; `marker_image` draws its markers. The prototype
 /// becomes the object "prototype", its markers "marker-FAMILY:ID", the table "table".
-/// `skipped_variants`: as scene::load_scene's.
+/// `skipped_variants`: as scene::load_scene's; without it what is left out is a warning.
 Result<World> load_world(const std::filesystem::path& path,
                          const MarkerImage& marker_image,
                          std::vector<scene::SkippedVariant>* skipped_variants = nullptr);

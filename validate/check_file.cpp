@@ -304,7 +304,8 @@ Result<Check> load_check(const fs::path& path) {
 
   LIMN_TRY(check.truth, sim::load_world(world_file, tracker::marker_image));
   if (!scene_folder.empty()) {
-    LIMN_TRY(scene::Scene other, scene::load_scene((config.folder() / scene_folder).lexically_normal()));
+    LIMN_TRY(scene::Scene other,
+             scene::load_usable_scene((config.folder() / scene_folder).lexically_normal()));
     replace_scene(std::move(other), &check.truth);
   }
   if (!check.truth.scene || !check.truth.scene->prototype) {

@@ -99,6 +99,7 @@ scene::Mesh CheckRun::coat() const {
       scene::Material{.base_colour = Eigen::Vector3f::Constant(float(k_coat)), .unlit = true, .texture = {}}};
   coat.triangle_materials.assign(coat.triangles.size(), 0);
   coat.uvs.clear();
+  coat.colours.clear();
   return coat;
 }
 

@@ -127,7 +127,7 @@ class Steps {
   Result<scene::Scene> painted_scene() const {
     scene::Scene scene;
     if (world_from_prototype_) {
-      LIMN_TRY(scene, scene::load_scene(steps_.scene));
+      LIMN_TRY(scene, scene::load_usable_scene(steps_.scene));
       return scene;
     }
     scene.prototype = scene::Prototype{};

@@ -232,6 +232,87 @@ TEST_F(RenderDoor, SparesOrLightsTheMarkers) {
   EXPECT_NE(light_on_marker(tracker::MarkerLight::as_is), (std::array{255, 255, 255}));
 }
 
+// A plate of 200 x 160 mm whose left side is red and whose right side is blue, linear light, not shaded.
+std::string two_coloured_gltf() {
+  const float numbers[] = {-0.1F, -0.08F, 0, 0.1F, -0.08F, 0, 0.1F, 0.08F, 0, -0.1F, 0.08F, 0,   // positions
+                           1,     0,      0, 0,    0,      1, 0,    0,     1, 1,     0,     0};  // colours
+  std::string bytes;
+  for (const char c : std::string(reinterpret_cast<const char*>(numbers), sizeof(numbers)))
+    bytes += fmt::format("%{:02x}", static_cast<unsigned char>(c));
+  return R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0}],"extensionsUsed":["KHR_materials_unlit"],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0,"COLOR_0":1},"mode":6,"material":0}]}],
+"materials":[{"extensions":{"KHR_materials_unlit":{}}}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3"},{"bufferView":1,"componentType":5126,"count":4,"type":"VEC3"}],
+"bufferViews":[{"buffer":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":48}],
+"buffers":[{"byteLength":96,"uri":"data:application/octet-stream,)" +
+         bytes + R"("}]})";
+}
+
+// A scene without a prototype whose slot has these variants, seen by a camera 1 m in front of the part.
+RenderOptions seen_part(const fs::path& folder, const json& variants, const json& pose) {
+  Rig rig;
+  rig.cameras = {test_camera()};
+  EXPECT_TRUE(save_rig(rig, folder / "rig"));
+  json slot = slot_on("flag", "aruco_6x6_250:40");
+  slot["variants"] = variants;
+  EXPECT_TRUE(make_folder(folder / "scene"));
+  EXPECT_TRUE(write_file(folder / "scene/flag.obj", flag_obj()));
+  EXPECT_TRUE(write_file(folder / "scene/plate.gltf", two_coloured_gltf()));
+  EXPECT_TRUE(write_file(folder / "scene/broken.ply", "ply\nformat ascii 1.0\n"));
+  EXPECT_TRUE(
+      write_file(folder / "scene/scene.json", json({{"schema", "limn.scene/1"}, {"slots", {slot}}}).dump()));
+  EXPECT_TRUE(write_file(folder / "poses.json", json({{"slots", {{"flag", pose}}}}).dump()));
+  const json view = {{"world_from_viewer", to_json(Pose())}, {"size", {400, 300}}, {"fov_deg", 30}};
+  EXPECT_TRUE(write_file(folder / "view.json", view.dump()));
+  RenderOptions options;
+  options.rig = folder / "rig";
+  options.scene = folder / "scene";
+  options.poses = folder / "poses.json";
+  options.view = folder / "view.json";
+  options.out = folder / "out";
+  return options;
+}
+
+// Colours are interpolated in linear light: half red and half blue in the middle is level 188 of both.
+TEST(Render, ColoursOfVerticesAreShown) {
+  const fs::path folder = test::test_folder();
+  const json pose = {{"world_from_part", to_json(Pose(Eigen::Quaterniond::Identity(), Vector3d(0, 0, 1)))}};
+  const RenderOptions options = seen_part(folder, {{{"name", "a"}, {"mesh", "plate.gltf"}}}, pose);
+  const Status status = run_render(options);
+  ASSERT_TRUE(status) << status.message();
+  const cv::Mat view = read_image(folder / "out/view.png").value();
+  const double px_per_m = 200 / std::tan(15 * std::numbers::pi / 180);
+  for (const double x : {-0.08, -0.05, 0.0, 0.05, 0.08}) {
+    const cv::Vec3b c = view.at<cv::Vec3b>(150, static_cast<int>(std::lround(199.5 + px_per_m * x)));
+    const auto level = [](double linear) { return 255 * (1.055 * std::pow(linear, 1 / 2.4) - 0.055); };
+    EXPECT_NEAR(c[2], level(0.5 - x / 0.2), 2) << x;
+    EXPECT_NEAR(c[0], level(0.5 + x / 0.2), 2) << x;
+    EXPECT_LT(c[1], 2) << x;
+  }
+}
+
+TEST(Render, ABrokenVariantStopsOnlyWhatShowsIt) {
+  const fs::path folder = test::test_folder();
+  const json broken = {{"name", "broken"}, {"mesh", "broken.ply"}, {"units", "mm"}};
+  const json whole = {{"name", "whole"}, {"mesh", "flag.obj"}, {"units", "mm"}};
+  const json pose = to_json(Pose(Eigen::Quaterniond::Identity(), Vector3d(0, 0, 1)));
+  testing::internal::CaptureStderr();
+  const Status beside = run_render(seen_part(folder, {whole, broken}, {{"world_from_part", pose}}));
+  const std::string messages = testing::internal::GetCapturedStderr();
+  ASSERT_TRUE(beside) << beside.message();
+  EXPECT_NE(messages.find("broken of slot flag is left out"), std::string::npos) << messages;
+  for (const json& shows_it :
+       {json{{"world_from_part", pose}, {"variant", "broken"}}, {{"world_from_part", pose}}}) {
+    const json variants = shows_it.contains("variant") ? json{whole, broken} : json{broken, whole};
+    const Status shown = run_render(seen_part(folder, variants, shows_it));
+    ASSERT_FALSE(shown);
+    EXPECT_NE(shown.message().find("broken.ply: expected a PLY file"), std::string::npos) << shown.message();
+  }
+  const Status other =
+      run_render(seen_part(folder, {broken, whole}, {{"world_from_part", pose}, {"variant", "whole"}}));
+  EXPECT_TRUE(other) << other.message();
+}
+
 TEST_F(RenderDoor, BalancesLightAndSaysWhatItCannotGive) {
   ASSERT_TRUE(run_render(options));
   const cv::Mat as_it_is = read_image(folder / "out/projector-projector0.png").value();

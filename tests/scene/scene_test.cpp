@@ -271,6 +271,12 @@ TEST(Scene, PartsThatCannotBeLoadedAreLeftOutWhenThatIsAskedFor) {
   ASSERT_TRUE(write_file(folder / "slots/mirror/half.glb", "glTF"));
   fs::remove(folder / "mirror-sport.glb");
   EXPECT_FALSE(load_scene(folder));
+  testing::internal::CaptureStderr();
+  const auto warned = load_usable_scene(folder);
+  const std::string messages = testing::internal::GetCapturedStderr();
+  ASSERT_TRUE(warned) << warned.message();
+  for (const char* word : {"of slot mirror is left out", "mirror-sport.glb", "half.glb"})
+    EXPECT_NE(messages.find(word), std::string::npos) << word << " in: " << messages;
   std::vector<SkippedVariant> skipped_variants;
   const auto scene = load_scene(folder, &skipped_variants);
   ASSERT_TRUE(scene) << scene.message();
@@ -301,6 +307,62 @@ TEST(Scene, PartsWhoseFileNamesAreNotUtf8AreLeftOut) {
   EXPECT_EQ(skipped_variants[0].variant, "gr\xef\xbf\xbdn");
   EXPECT_NE(skipped_variants[0].why.find("expected a file name in UTF-8"), std::string::npos)
       << skipped_variants[0].why;
+}
+
+// What people leave in a slot's folder besides meshes is listed with the reason; what belongs to meshes is
+// not.
+TEST(Scene, WhatIsNoMeshInASlotsFolderIsListedWithTheReason) {
+  const fs::path folder = folder_with(whole_scene()), slots = folder / "slots";
+  const std::string mesh = "v 0 0 0\nv 200 0 0\nv 0 100 0\nf 1 2 3\n";
+  for (const char* taken :
+       {"mirror/Chrome.OBJ", "mirror/unzipped/part.obj", "mirorr/part.obj", "stray.obj"}) {
+    fs::create_directories((slots / taken).parent_path());
+    ASSERT_TRUE(write_file(slots / taken, mesh));
+  }
+  for (const char* name : {"housing.STEP", "project.blend", "all.zip", "notes.txt", "wood.png", "part.mtl",
+                           "part.bin", ".hidden", "~lock"})
+    ASSERT_TRUE(write_file(slots / "mirror" / name, "x"));
+  std::vector<SkippedVariant> skipped;
+  const auto scene = load_scene(folder, &skipped);
+  ASSERT_TRUE(scene) << scene.message();
+  EXPECT_EQ(scene->find_slot("mirror")->variants.back().name, "Chrome");
+  std::map<std::string, std::string> reasons;
+  for (const SkippedVariant& item : skipped) reasons[item.slot + "/" + item.variant] = item.why;
+  const std::map<std::string, std::string> expected = {
+      {"mirror/housing.STEP", "it is a CAD file"},
+      {"mirror/project.blend", "a project of a modelling program"},
+      {"mirror/all.zip", "Unpack it"},
+      {"mirror/notes.txt", "it is no mesh that Limn reads"},
+      {"mirror/unzipped", "it is a folder"},
+      {"(none)/mirorr", "named after a slot (mirror, trim)"},
+      {"(none)/stray.obj", "in a slot's folder (mirror, trim)"}};
+  EXPECT_EQ(reasons.size(), expected.size());
+  for (const auto& [name, why] : expected)
+    EXPECT_NE(reasons[name].find(why), std::string::npos) << name << ": " << reasons[name];
+}
+
+TEST(Scene, FilesThatStateTheirUnitNeedNoneAndAreNotAskedAbout) {
+  const fs::path door = fs::path(LIMN_SOURCE_DIR) / "config/scenes/door";
+  json scene = whole_scene();
+  scene["slots"][0]["variants"][0] = {{"name", "a"}, {"mesh", "city.glb"}};
+  const fs::path folder = folder_with(scene), mirror = folder / "slots/mirror";
+  fs::create_directories(mirror);
+  fs::copy_file(door / "mirror-city.glb", folder / "city.glb");
+  fs::copy_file(door / "mirror-city.glb", mirror / "dropped.glb");
+  ASSERT_TRUE(write_file(mirror / "unknown.obj", "v 0 0 0\nv 149 0 0\nv 0 60 0\nf 1 2 3\n"));
+  const auto loaded = load_scene(folder);
+  ASSERT_TRUE(loaded) << loaded.message();
+  const std::vector<Variant>& variants = loaded->find_slot("mirror")->variants;
+  ASSERT_EQ(variants.size(), 4U);
+  EXPECT_EQ(variants[2].name, "dropped");
+  EXPECT_EQ(variants[2].mesh.positions, variants[0].mesh.positions);
+  EXPECT_EQ(units_question(*loaded->find_slot("mirror"), variants[2]), "");
+  EXPECT_NE(
+      units_question(*loaded->find_slot("mirror"), variants[3]).find("assumed to be in mm, 149 mm long"),
+      std::string::npos);
+  // Only answers of people are written, not what files state.
+  const std::string units = units_json(*loaded->find_slot("mirror"), "unknown", LengthUnit::inch);
+  EXPECT_EQ(units.find("dropped"), std::string::npos) << units;
 }
 
 TEST(Scene, TheDoorOfTheConfigFolderLoads) {

@@ -525,7 +525,7 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
   ASSERT_TRUE(lived.ok()) << lived.message();
   const std::string page = read_file(folder / "out/session.html").value();
   EXPECT_NE(page.find("loaded again"), std::string::npos);
-  EXPECT_NE(page.find("The parts stay as they were"), std::string::npos);
+  EXPECT_NE(page.find("new of slot mirror stays as it was"), std::string::npos);
   std::string last;
   for (const std::string& line : lines_of(folder / "out/poses.csv"))
     if (line.find(",mirror,") != std::string::npos) last = line;

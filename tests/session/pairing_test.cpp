@@ -406,7 +406,8 @@ TEST_F(ASession, SplitsTheScreenAsTheSurface) {
 TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
   const fs::path slot = folder_ / "door/slots/mirror";
   fs::create_directories(slot);
-  fs::copy_file(folder_ / "door/mirror-sport.glb", slot / "new part.glb");
+  ASSERT_TRUE(
+      write_file(slot / "new part.obj", "v 0 0 0\nv 149 0 0\nv 0 60 0\nv 0 0 30\nf 1 2 3\nf 1 2 4\n"));
   auto scene = scene::load_scene(folder_ / "door");
   ASSERT_TRUE(scene) << scene.message();
   const auto long_side = [](const scene::Scene& loaded) {
@@ -418,12 +419,12 @@ TEST_F(ASession, AsksForTheUnitOfWhatIsDroppedAndTakesTheAnswer) {
   ASSERT_TRUE(session_->replace_scene(*scene, rig_->now()).ok());
   const fs::path page = folder_ / "page.html";
   ASSERT_TRUE(telemetry_->write_page(page, "x").ok());
-  EXPECT_NE(read_file(page).value().find("is assumed to be in m, 149 mm long."), std::string::npos);
+  EXPECT_NE(read_file(page).value().find("is assumed to be in mm, 149 mm long."), std::string::npos);
   edit("units", "mirror", "new part cm");
   session_->store().finish();
   scene = scene::load_scene(folder_ / "door");
   ASSERT_TRUE(scene) << scene.message();
-  EXPECT_NEAR(long_side(*scene) / guessed, 0.01, 1e-5);
+  EXPECT_NEAR(long_side(*scene) / guessed, 10, 1e-4);
   EXPECT_EQ(scene::units_question(*scene->find_slot("mirror"), scene->find_slot("mirror")->variants.back()),
             "");
   ASSERT_TRUE(

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
 
 #include "scene/tangents.h"
+#include "sim/ray_scene.h"
 #include "tests/support/matchers.h"
 
 namespace limn::sim {
@@ -149,6 +151,23 @@ TEST(ReferenceBrdf, TexturesAndFactorsAreMultipliedAndRepeat) {
   }
   // Half way between the texture and its repetition.
   EXPECT_NEAR(surface_material(mesh, 0, {0, 0.75F}).roughness, 0.7, 1e-6);
+}
+
+// A triangle whose corners are red, green and blue; its material lets half of the red through.
+TEST(SurfaceMaterial, ColoursOfVerticesMultiplyTheBaseColour) {
+  scene::Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normals.assign(3, {0, 0, 1});
+  mesh.colours = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.triangle_materials = {0};
+  mesh.materials[0].base_colour = {0.5F, 1, 1};
+  const std::array placed = {MeshInstance{&mesh, {}}};
+  const RayScene rays(placed);
+  const Hit hit = rays.first_hit({{0.25, 0.25, 1}, {0, 0, -1}});
+  ASSERT_EQ(hit.triangle, 0);
+  const SurfaceMaterial found = surface_material(mesh, hit.triangle, rays.uv(hit), rays.colour(hit));
+  EXPECT_TRUE(test::near(found.base, Vector3d(0.25, 0.25, 0.5 * 0.5), 1e-6));  // BGR
 }
 
 }  // namespace

@@ -16,6 +16,7 @@
 #include "core/rig.h"
 #include "core/stopwatch.h"
 #include "scene/marker_file.h"
+#include "scene/mesh_content.h"
 #include "scene/scan_preview.h"
 #include "scene/scene.h"
 #include "tracker/body_pose.h"
@@ -108,7 +109,7 @@ Result<Track> track_in_frames(const AlignOptions& command, const Body& body, con
 Result<Start> start_from_markers(const AlignOptions& command) {
   if (command.rig.empty() || command.frames.empty())
     return usage_error("--scene: the markers of its prototype need --rig RIG and --frame CAMERA=PICTURE.");
-  LIMN_TRY(const scene::Scene scene, scene::load_scene(command.scene));
+  LIMN_TRY(const scene::Scene scene, scene::load_usable_scene(command.scene));
   const std::vector<Body> bodies = scene::bodies(scene);
   const Body* body = find_named(bodies, "prototype");
   if (body == nullptr || body->markers.empty())
@@ -141,8 +142,9 @@ Status check_options(const AlignOptions& command) {
         "expected a CAD file (--mesh and --units) or a --scene with a prototype, found neither.");
   if (!command.body.empty() && (command.rig.empty() || command.frames.empty() || command.scan.empty()))
     return usage_error("--body: expected --scan, --rig and --frame CAMERA=PICTURE with it.");
-  if (!command.mesh.empty() && !command.units)
-    return usage_error("--units: expected m, cm, mm, in or ft of the CAD, found none.");
+  if (!command.mesh.empty() && !command.units && !scene::states_unit(command.mesh))
+    return usage_error(
+        "--units: expected m, cm, mm, in or ft of the CAD, whose format states no unit, found none.");
   const int starts = !command.start.empty() + !command.points.empty() + starts_from_markers(command);
   if (starts > 1) return usage_error("expected one of --start, --points, --scene, found {}.", starts);
   if (command.scan.empty() && command.scene.empty())
@@ -289,8 +291,8 @@ Result<MeshAligned> written_markers_pose(const Start& start, const AlignOptions&
 
 // The mesh to align with the scan: the CAD file, or the scene's prototype.
 Result<scene::Mesh> mesh_of(const AlignOptions& command) {
-  if (!command.mesh.empty()) return scene::load_mesh(command.mesh, *command.units);
-  LIMN_TRY(scene::Scene scene, scene::load_scene(command.scene));
+  if (!command.mesh.empty()) return scene::load_mesh(command.mesh, command.units);
+  LIMN_TRY(scene::Scene scene, scene::load_usable_scene(command.scene));
   if (!scene.prototype) return error("{}: expected a prototype, found none.", command.scene.string());
   return std::move(scene.prototype->mesh);
 }
@@ -300,8 +302,8 @@ Result<scene::Mesh> mesh_of(const AlignOptions& command) {
 Result<MeshAligned> align_scan(const AlignOptions& command) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY_STATUS(check_options(command));
-  const double metres = command.mesh.empty() ? 1 : scene::metres_per_unit(*command.units);
   LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
+  const double metres = command.mesh.empty() ? 1 : mesh.metres_per_unit;
   LIMN_TRY(const auto start, start_of(command, metres));
   if (command.scan.empty()) return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
   const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
