@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <bitset>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
@@ -12,7 +14,7 @@
 #include <vector>
 
 #include "core/file.h"
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 #include "core/log.h"
 
 namespace limn {
@@ -28,7 +30,8 @@ constexpr std::array k_extensions = {".png", ".jpg", ".jpeg", ".jpe",  ".pbm",  
 std::optional<Format> format_of(std::string_view bytes) {
   if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return Format::png;
   if (bytes.starts_with("\xff\xd8\xff")) return Format::jpeg;
-  if (bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' && std::isspace(bytes[2]))
+  if (bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
+      std::isspace(static_cast<unsigned char>(bytes[2])))
     return Format::pnm;
   if (bytes.starts_with("BM")) return Format::bmp;
   for (const std::string_view tiff : {"II*\0", "MM\0*", "II+\0", "MM\0+"})
@@ -48,6 +51,7 @@ std::string foreign_format(std::string_view bytes) {
   };
   static constexpr std::array k_known = {
       Signature{0, "GIF8", "a GIF"},
+      Signature{0, std::string_view("\0\0\1\0", 4), "an icon (ICO)"},
       Signature{4, "ftypheic", "a HEIC photograph"},
       Signature{4, "ftypheix", "a HEIC photograph"},
       Signature{4, "ftypmif1", "a HEIF or AVIF photograph"},
@@ -103,16 +107,20 @@ int used_bits_of(const StoredImage& image) {
   if (image.is_stated || image.samples.channels() == 4) return k_full_range;
   int brightest = 0;
   bool all_64 = true, all_257 = true;
+  std::bitset<1024> levels;  // used if all samples are multiples of 64
   for (int y = 0; y < image.samples.rows; ++y) {
     const auto* row = image.samples.ptr<std::uint16_t>(y);
     const int count = image.samples.cols * image.samples.channels();
     for (int k = 0; k < count; ++k) {
       brightest = std::max<int>(brightest, row[k]);
       all_64 = all_64 && row[k] % 64 == 0;
+      levels.set(row[k] / 64);
       all_257 = all_257 && row[k] % 257 == 0;
     }
   }
-  if (all_64 || all_257) return k_full_range;
+  // A drawing of few levels at the low end may have multiples of 64 alone.
+  constexpr std::size_t k_least_levels = 8;
+  if (all_257 || (all_64 && levels.count() >= k_least_levels)) return k_full_range;
   for (const int bits : {10, 12, 14})
     if (brightest < 1 << bits) return bits;
   return k_full_range;
@@ -199,7 +207,10 @@ Result<cv::Mat> decode_image(std::string_view bytes, const std::string& name, co
   if (!stored) return error("{}: {}", name, stored.message());
   if (!stored->note.empty()) log_warning("{}: {}", name, stored->note);
   cv::Mat image = as_8_bits(*stored, options.used_bits);
-  if (image.channels() == 4 && (options.grey || !options.alpha)) image = on_white(image);
+  if (image.channels() == 4 && options.alpha == Alpha::ignored)
+    cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  else if (image.channels() == 4 && (options.grey || options.alpha == Alpha::on_white))
+    image = on_white(image);
   return options.grey ? to_grey(image) : image;
 }
 
@@ -208,7 +219,9 @@ Result<cv::Mat> read_image(const fs::path& path, const ImageOptions& options) {
   return decode_image(bytes, path.string(), options);
 }
 
-Result<cv::Mat> read_image_with_alpha(const fs::path& path) { return read_image(path, {.alpha = true}); }
+Result<cv::Mat> read_image_with_alpha(const fs::path& path) {
+  return read_image(path, {.alpha = Alpha::kept});
+}
 
 Result<cv::Mat> read_grey_image(const fs::path& path, int used_bits) {
   return read_image(path, {.grey = true, .used_bits = used_bits});

@@ -19,10 +19,17 @@ inline constexpr int k_full_range = 16;
 /// How many bits of a 16-bit sample are used is found from the image itself, see find_used_bits().
 inline constexpr int k_found_in_image = 0;
 
+/// What becomes of an image's alpha.
+enum class Alpha {
+  on_white,  ///< Transparent parts are shown on white, as paper is.
+  ignored,   ///< The colours are read as stored, as textures of opaque materials are.
+  kept       ///< The image is BGRA if the file has alpha.
+};
+
 /// How an image is read.
 struct ImageOptions {
-  bool grey = false;   ///< One grey channel, for images with colour, too.
-  bool alpha = false;  ///< BGRA where the image has alpha. Otherwise transparent parts are shown on white.
+  bool grey = false;  ///< One grey channel, for images with colour, too; alpha cannot be kept then.
+  Alpha alpha = Alpha::on_white;
   /// 16-bit samples: how many of the bits are used, counted from the lowest one: 10, 12, 14, k_full_range or
   /// k_found_in_image. The highest eight of these bits are read. Cameras store 10 to 14 bits at the low end;
   /// images that programs draw (textures) have the full range.
@@ -45,9 +52,10 @@ Result<cv::Mat> read_image_with_alpha(const std::filesystem::path& path);
 Result<cv::Mat> read_grey_image(const std::filesystem::path& path, int used_bits = k_found_in_image);
 
 /// How many bits of its 16-bit samples an image uses, from the lowest one: 10, 12 or 14 if no sample is above
-/// 1023, 4095 or 16383, else k_full_range. Samples that are all multiples of 64 or of 257 are 8 or 10 bits at
-/// the high end of a dark image: k_full_range. Images that state their white (a PGM's maximum) and images of
-/// 8 bits are k_full_range. The brightest image of a series decides for all of them.
+/// 1023, 4095 or 16383, else k_full_range. Samples that are all multiples of 64 (of at least eight levels) or
+/// of 257 are 8 or 10 bits at the high end of a dark image: k_full_range. So are images of 8 bits, with
+/// alpha, and those that state their white (a PGM's maximum). The brightest image of a series decides for all
+/// of them.
 Result<int> find_used_bits(const std::filesystem::path& path);
 
 /// Whether the name's extension is that of an image that read_image reads, in capitals or not.

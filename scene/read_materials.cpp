@@ -55,7 +55,7 @@ fs::path texture_path(const std::string& name, const fs::path& mesh_path) {
 }
 
 Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
-  auto image = with_alpha ? read_image_with_alpha(path) : read_image(path);
+  auto image = read_image(path, {.alpha = with_alpha ? Alpha::kept : Alpha::ignored});
   if (!image) return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
   return image;
 }

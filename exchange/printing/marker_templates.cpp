@@ -75,7 +75,7 @@ std::string similarities_json(const std::vector<TemplateSimilarity>& pairs) {
 Status train_template(const std::filesystem::path& image, const std::filesystem::path& out) {
   if (out.extension() != ".patt")
     return usage_error("--out: expected a file that ends in .patt for a template, found '{}'.", out.string());
-  LIMN_TRY(const cv::Mat pixels, read_image(image));
+  LIMN_TRY(const cv::Mat pixels, read_image(image, {.used_bits = k_found_in_image}));
   const auto trained = tracker::train_template(pixels);
   if (!trained) return error("{}: {}", image.string(), trained.message());
   LIMN_TRY_STATUS(write_file(out, tracker::template_text(*trained)));

@@ -6,13 +6,13 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 namespace limn::image_formats {
 namespace {
 
 constexpr std::size_t k_ihdr_end = 8 + 25;         // signature, length + "IHDR" + 13 bytes + CRC
-constexpr png_alloc_size_t k_max_chunk = 1 << 26;  // of a colour profile or a text
+constexpr png_alloc_size_t k_max_chunk = 1 << 26;  // enough for a colour profile or a text
 
 unsigned big_endian_32(std::string_view bytes, std::size_t at) {
   unsigned value = 0;

@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <vector>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 // Truevision TGA File Format Specification, version 2.0 (1991).
 namespace limn::image_formats {
@@ -21,6 +22,7 @@ struct Header {
   unsigned bits = 0;
 
   std::size_t pixel_bytes() const { return (bits + 7) / 8; }
+  bool has_alpha() const { return (kind == k_palette ? palette_bits : bits) == 32; }
   std::size_t palette_bytes() const { return palette_count * ((palette_bits + 7) / 8); }
 };
 
@@ -82,10 +84,12 @@ std::optional<std::string> unpacked(std::string_view data, const Header& header)
   return pixels;
 }
 
-// One table entry for each colour of the palette. Nullopt: the file ends in it.
+// One table entry for each colour of the palette; none if the pixels are colours. Nullopt: the file ends in
+// the palette.
 std::optional<std::vector<Pixel>> read_palette(std::string_view data, const Header& header) {
   if (data.size() < header.palette_bytes()) return std::nullopt;
   std::vector<Pixel> palette;
+  if (header.kind != k_palette) return palette;
   for (std::size_t i = 0; i < header.palette_count; ++i)
     palette.push_back(colour_at(data, i * ((header.palette_bits + 7) / 8), header.palette_bits));
   return palette;
@@ -143,6 +147,8 @@ Result<StoredImage> decode_tga(std::string_view bytes) {
   StoredImage stored{*image};
   if (header->is_bottom_up) cv::flip(stored.samples, stored.samples, 0);
   if (header->is_right_to_left) cv::flip(stored.samples, stored.samples, 1);
+  if (!header->has_alpha() && header->kind != k_grey)
+    cv::cvtColor(stored.samples, stored.samples, cv::COLOR_BGRA2BGR);
   drop_empty_alpha(&stored.samples);
   return stored;
 }

@@ -1,6 +1,6 @@
 #include <webp/decode.h>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 namespace limn::image_formats {
 

@@ -7,7 +7,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 namespace limn::image_formats {
 namespace {
@@ -82,6 +82,7 @@ class Reader {
   Result<StoredImage> read(bool grey) {
     if (!read_header()) return damaged("JPEG", bytes_, reason_);
     LIMN_TRY_STATUS(check_size(decoder_.image_width, decoder_.image_height));
+    if (!has_enough_bytes()) return damaged("JPEG", bytes_, "the file ends too early");
     choose_colours(grey);
     const int height = static_cast<int>(decoder_.image_height),
               width = static_cast<int>(decoder_.image_width);
@@ -122,6 +123,13 @@ class Reader {
     return true;
   }
 
+  // Huffman codes take at least one bit for 8x8 pixels. Without this check, a short file with a great size in
+  // its header takes gigabytes of memory.
+  bool has_enough_bytes() const {
+    const auto pixels = static_cast<std::size_t>(decoder_.image_width) * decoder_.image_height;
+    return decoder_.arith_code || bytes_.size() * 8 * DCTSIZE2 >= pixels;
+  }
+
   void choose_colours(bool grey) {
     const J_COLOR_SPACE stored = decoder_.jpeg_color_space;
     is_light_ = decoder_.saw_Adobe_marker;
@@ -158,7 +166,7 @@ class Reader {
   char reason_[JMSG_LENGTH_MAX] = "";
   cv::Mat image_;
   int channels_ = 3;
-  bool is_light_ = false;         // of a CMYK image
+  bool is_light_ = false;         // a CMYK image holds light instead of ink
   bool has_ended_ = false;        // the decoder needed more than the file has
   bool is_scan_missing_ = false;  // valid after read_rows()
 };

@@ -7,12 +7,14 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
+#include "core/image_io.h"
 
 namespace limn::image_formats {
 namespace {
 
-constexpr tmsize_t k_max_allocation = tmsize_t{1} << 32;  // of libtiff, for one strip or tile
+constexpr tmsize_t k_max_allocation = tmsize_t{1} << 32;  // libtiff, for one strip or tile
+constexpr std::size_t k_max_ratio = 20'000;  // no compression of levels makes data this much smaller
 
 // The bytes of the file, and what libtiff complains about first.
 struct Memory {
@@ -87,7 +89,10 @@ Header read_header(TIFF* tiff) {
   std::uint16_t extra_count = 0, *extra = nullptr;
   TIFFGetFieldDefaulted(tiff, TIFFTAG_EXTRASAMPLES, &extra_count, &extra);
   for (int i = 0; i < extra_count && header.alpha < 0; ++i) {
-    if (extra[i] != EXTRASAMPLE_ASSOCALPHA && extra[i] != EXTRASAMPLE_UNASSALPHA) continue;
+    // One sample of no stated kind is alpha in practice.
+    const bool is_alpha = extra[i] == EXTRASAMPLE_ASSOCALPHA || extra[i] == EXTRASAMPLE_UNASSALPHA ||
+                          (extra[i] == EXTRASAMPLE_UNSPECIFIED && extra_count == 1);
+    if (!is_alpha) continue;
     header.alpha = header.colour_samples() + i;
     header.is_alpha_multiplied = extra[i] == EXTRASAMPLE_ASSOCALPHA;
   }
@@ -135,7 +140,8 @@ void unpack(const std::uint8_t* row, int bits, int count, std::uint16_t* out) {
 // Reads strips and tiles of levels into `samples`: 16 bits, all samples of a pixel side by side.
 class LevelReader {
  public:
-  LevelReader(TIFF* tiff, const Header& header) : tiff_(tiff), header_(header) {
+  LevelReader(TIFF* tiff, const Header& header, std::size_t file_bytes)
+      : tiff_(tiff), header_(header), file_bytes_(file_bytes) {
     if (TIFFIsTiled(tiff)) {
       TIFFGetField(tiff, TIFFTAG_TILEWIDTH, &block_width_);
       TIFFGetField(tiff, TIFFTAG_TILELENGTH, &block_height_);
@@ -149,7 +155,7 @@ class LevelReader {
   bool read(cv::Mat* samples) {
     if (block_width_ == 0 || block_height_ == 0) return false;
     const tmsize_t size = TIFFIsTiled(tiff_) ? TIFFTileSize(tiff_) : TIFFStripSize(tiff_);
-    if (size <= 0) return false;
+    if (size <= 0 || static_cast<std::size_t>(size) / k_max_ratio > file_bytes_) return false;
     block_.resize(static_cast<std::size_t>(size));
     const int planes = header_.planes == PLANARCONFIG_SEPARATE ? header_.samples : 1;
     for (int plane = 0; plane < planes; ++plane)
@@ -190,6 +196,7 @@ class LevelReader {
 
   TIFF* tiff_;
   Header header_;
+  std::size_t file_bytes_;
   std::uint32_t block_width_ = 0, block_height_ = 0;
   std::vector<std::uint8_t> block_;
   std::vector<std::uint16_t> row_;
@@ -211,7 +218,8 @@ cv::Mat in_order(const cv::Mat& samples, const Header& header) {
 
 Result<StoredImage> read_levels(TIFF* tiff, const Header& header, const Memory& memory) {
   cv::Mat samples(static_cast<int>(header.height), static_cast<int>(header.width), CV_16UC(header.samples));
-  if (!LevelReader(tiff, header).read(&samples)) return damaged("TIFF", memory.bytes, memory.reason);
+  if (!LevelReader(tiff, header, memory.bytes.size()).read(&samples))
+    return damaged("TIFF", memory.bytes, memory.reason);
   StoredImage image{in_order(samples, header), (1 << header.bits) - 1, header.bits < 16};
   if (header.colours == PHOTOMETRIC_MINISWHITE) {
     const cv::Scalar white = cv::Scalar::all(image.white);
@@ -220,21 +228,25 @@ Result<StoredImage> read_levels(TIFF* tiff, const Header& header, const Memory& 
     if (header.alpha >= 0) cv::mixChannels(image.samples, inverted, {3, 3});
     image.samples = inverted;
   }
-  if (header.is_alpha_multiplied) undo_multiplied_alpha(&image.samples, image.white);
+  drop_empty_alpha(&image.samples);
+  if (header.is_alpha_multiplied && image.samples.channels() == 4)
+    undo_multiplied_alpha(&image.samples, image.white);
   if (header.bits == 8) image.samples.convertTo(image.samples, CV_8U);
   return image;
 }
 
 // libtiff converts palettes, few bits, CMYK, YCbCr and Lab.
-Result<StoredImage> read_converted(TIFF* tiff, const Header& header, const Memory& memory) {
+Result<StoredImage> read_converted(TIFF* tiff, const Header& header, Memory* memory) {
   TIFFRGBAImage converter;
   char reason[1024] = "";
-  if (!TIFFRGBAImageBegin(&converter, tiff, 1, reason)) return damaged("TIFF", memory.bytes, reason);
+  if (!TIFFRGBAImageBegin(&converter, tiff, 1, reason)) return damaged("TIFF", memory->bytes, reason);
   converter.req_orientation = converter.orientation;  // rows and columns as stored
   cv::Mat rgba(static_cast<int>(header.height), static_cast<int>(header.width), CV_8UC4);
+  memory->reason.clear();
   const int done = TIFFRGBAImageGet(&converter, rgba.ptr<std::uint32_t>(), header.width, header.height);
   TIFFRGBAImageEnd(&converter);
-  if (!done) return damaged("TIFF", memory.bytes, memory.reason);
+  // After some errors in the data the rest is white, and no failure is returned.
+  if (!done || !memory->reason.empty()) return damaged("TIFF", memory->bytes, memory->reason);
   StoredImage image;
   cv::cvtColor(rgba, image.samples, cv::COLOR_RGBA2BGR);
   if (header.is_grey()) cv::extractChannel(rgba, image.samples, 0);
@@ -257,8 +269,12 @@ Result<StoredImage> decode_tiff(std::string_view bytes) {
   const Header header = read_header(tiff.get());
   LIMN_TRY_STATUS(check_size(header.width, header.height));
   LIMN_TRY_STATUS(check(header));
+  if (static_cast<long>(header.width) * header.height * header.samples > 4 * k_max_image_pixels)
+    return error(
+        "expected at most 4 samples for each of {} million pixels, found {}x{} of {}. Make it smaller.",
+        k_max_image_pixels / 1'000'000, header.width, header.height, header.samples);
   LIMN_TRY(StoredImage image, header.has_levels() ? read_levels(tiff.get(), header, memory)
-                                                  : read_converted(tiff.get(), header, memory));
+                                                  : read_converted(tiff.get(), header, &memory));
   if (has_more_pages(tiff.get())) image.note = "holds several pages; the first one is read";
   return image;
 }

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 // Microsoft, "Bitmap Storage": BITMAPCOREHEADER, BITMAPINFOHEADER, BITMAPV4HEADER and BITMAPV5HEADER.
 namespace limn::image_formats {
@@ -24,6 +24,8 @@ struct Header {
   std::array<unsigned, 4> masks{};  // blue, green, red, alpha of 16 and 32 bits
 
   bool is_run_length() const { return compression == run_length_8 || compression == run_length_4; }
+  std::size_t palette_entry() const { return size == k_core_header ? 3 : 4; }
+  std::size_t palette_size() const { return colours > 0 ? std::min(colours, 256u) : std::size_t{1} << bits; }
   std::size_t row_bytes() const { return (static_cast<std::size_t>(width) * bits + 31) / 32 * 4; }
   std::size_t masks_end() const {
     const std::size_t behind = compression == fields ? 12 : compression == alpha_fields ? 16 : 0;
@@ -75,6 +77,9 @@ Result<Header> read_header(std::string_view bytes) {
     read_info_header(bytes, &header);
   if (bytes.size() < header.masks_end()) return cut;
   read_masks(bytes, &header);
+  // Some programs do not count the palette.
+  if (header.bits <= 8 && header.pixels_at == header.masks_end())
+    header.pixels_at += header.palette_size() * header.palette_entry();
   return header;
 }
 
@@ -98,10 +103,9 @@ Status check(const Header& header) {
 // 256 colours; black where the file has fewer.
 std::vector<Pixel> read_palette(std::string_view bytes, const Header& header) {
   std::vector<Pixel> palette(256, Pixel(0, 0, 0, 255));
-  const std::size_t entry = header.size == k_core_header ? 3 : 4, start = header.masks_end();
+  const std::size_t entry = header.palette_entry(), start = header.masks_end();
   const std::size_t end = std::min(header.pixels_at, bytes.size());
-  const std::size_t stated = header.colours > 0 ? header.colours : std::size_t{1} << header.bits;
-  for (std::size_t i = 0; i < std::min<std::size_t>(stated, 256) && start + (i + 1) * entry <= end; ++i)
+  for (std::size_t i = 0; i < header.palette_size() && start + (i + 1) * entry <= end; ++i)
     for (int k = 0; k < 3; ++k)
       palette[i][k] = static_cast<uchar>(bytes[start + i * entry + static_cast<std::size_t>(k)]);
   return palette;
@@ -215,8 +219,12 @@ Result<StoredImage> decode_bmp(std::string_view bytes) {
   const Error too_short = damaged("BMP", bytes, "the file ends too early");
   if (header.pixels_at > bytes.size()) return too_short;
   const std::string_view pixels = bytes.substr(header.pixels_at);
-  const std::size_t needed = header.row_bytes() * static_cast<std::size_t>(header.height);
-  if (!header.is_run_length() && pixels.size() < needed) return too_short;
+  const auto width = static_cast<std::size_t>(header.width), height = static_cast<std::size_t>(header.height);
+  const std::size_t needed = header.row_bytes() * (height - 1) + (width * header.bits + 7) / 8;
+  // Two bytes hold at most 255 pixels of run lengths. (Those that are jumped over have none, but no known
+  // program writes such an image.)
+  const std::size_t least = header.is_run_length() ? needed / 255 : needed;
+  if (pixels.size() < least) return too_short;
   const std::vector<Pixel> palette =
       header.bits <= 8 ? read_palette(bytes, header) : std::vector<Pixel>(1, Pixel());
   const cv::Mat bgra = header.is_run_length() ? RunLengths(pixels, header, palette).read()

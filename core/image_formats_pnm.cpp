@@ -2,7 +2,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 namespace limn::image_formats {
 namespace {

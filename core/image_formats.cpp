@@ -1,4 +1,4 @@
-#include "core/image_formats/image_formats.h"
+#include "core/image_formats.h"
 
 #include <opencv2/core.hpp>
 
