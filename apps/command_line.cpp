@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -23,6 +24,7 @@
 #include "apps/learn_body.h"
 #include "apps/live.h"
 #include "apps/markers.h"
+#include "apps/output_files.h"
 #include "apps/patterns.h"
 #include "apps/plan_rig.h"
 #include "apps/recheck.h"
@@ -170,7 +172,12 @@ void add_detect(CLI::App& app, Run& run) {
       "Example: limn detect photo.jpg --family aruco_6x6_250 --camera camera0.cameramodel --size-mm 40 "
       "--draw out");
   auto options = std::make_shared<DetectOptions>();
-  command->add_option("images", options->images, "PNG or JPEG images")->required();
+  command
+      ->add_option(
+          "images", options->images,
+          "Images: PNG, JPEG, PGM, PPM, BMP, TIFF, WebP or TGA, rows as stored (an EXIF orientation is "
+          "ignored)")
+      ->required();
   command
       ->add_option(
           "--family", options->families,
@@ -849,6 +856,25 @@ Error out_of_memory() {
   return error("expected enough memory for this work, found none left. Use smaller images.");
 }
 
+// Wrong usage if a file that the command would write is one that it reads. A value may name its file after
+// "CAMERA=" or "FAMILY:".
+Status check_files(const CLI::App& command) {
+  static constexpr std::array k_outputs = {"--out", "--csv", "--json", "--draw", "--mount"};
+  std::vector<NamedFile> outputs, inputs;
+  for (const CLI::Option* option : command.get_options()) {
+    if (option->get_items_expected_max() == 0) continue;  // a flag
+    const std::string name = option->get_name();
+    const bool is_output = std::find(k_outputs.begin(), k_outputs.end(), name) != k_outputs.end();
+    for (const std::string& value : option->results()) {
+      (is_output ? outputs : inputs).push_back({name.starts_with("-") ? name : "", value});
+      for (const char separator : {'=', ':'})
+        if (const auto at = value.find(separator); at != std::string::npos && !is_output)
+          inputs.push_back({name, value.substr(at + 1)});
+    }
+  }
+  return check_outputs(outputs, inputs);
+}
+
 Error bug(const std::exception& problem) {
   return error("this is a bug in Limn, please report it: {}", problem.what());
 }
@@ -898,6 +924,7 @@ int run_arguments(int argc, char** argv) {
     return app.exit(problem) == 0 ? 0 : 2;
   }
   try {
+    if (const Status files = check_files(*app.get_subcommands().front()); !files) return report_result(files);
     return run();
   } catch (const std::filesystem::filesystem_error& problem) {
     return report_result(

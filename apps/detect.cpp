@@ -11,8 +11,10 @@
 #include <opencv2/imgproc.hpp>
 #include <set>
 
+#include "apps/output_files.h"
 #include "core/camera_files/imager_file.h"
 #include "core/config.h"
+#include "core/csv.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/json_text.h"
@@ -35,6 +37,8 @@ struct Marker {
 
 struct DetectOutcome {
   std::filesystem::path path;
+  std::string name;               // in the results
+  std::filesystem::path drawing;  // file to write; empty: none
   int width = 0, height = 0;
   std::vector<Marker> markers;
   std::optional<double> ms;
@@ -193,9 +197,9 @@ std::string outcomes_json(const std::vector<DetectOutcome>& outcomes) {
   nlohmann::json images = nlohmann::json::array();
   for (const DetectOutcome& outcome : outcomes) {
     if (!outcome.problem.empty()) continue;
-    nlohmann::json node = {{"file", outcome.path.filename().string()},
-                           {"size", {outcome.width, outcome.height}}};
+    nlohmann::json node = {{"file", outcome.name}, {"size", {outcome.width, outcome.height}}};
     if (outcome.ms) node["ms"] = *outcome.ms;
+    if (!outcome.drawing.empty()) node["drawing"] = outcome.drawing.string();
     node["markers"] = nlohmann::json::array();
     for (const Marker& marker : outcome.markers) node["markers"].push_back(json_of(marker));
     images.push_back(node);
@@ -208,7 +212,7 @@ std::string csv_text(const std::vector<DetectOutcome>& outcomes, bool with_famil
   for (const DetectOutcome& outcome : outcomes)
     for (const Marker& marker : outcome.markers) {
       const MarkerName& name = marker.detection.marker;
-      text += outcome.path.filename().string() + "," + (with_family ? name.text() : name.id);
+      text += csv_field(outcome.name) + "," + csv_field(with_family ? name.text() : name.id);
       for (const auto& px : marker.detection.corners_px)
         text += fmt::format(",{:.4f},{:.4f}", px.x(), px.y());
       text += fmt::format(",{:.4f}\n", marker.detection.score);
@@ -254,9 +258,8 @@ Status detect_in(const DetectOptions& options,
     outcome->markers.push_back(std::move(marker));
   }
   if (options.repeat > 0) outcome->ms = median_ms(detector, grey, lens_or_none, options.repeat);
-  if (options.draw.empty()) return {};
-  return write_png(options.draw / (outcome->path.stem().string() + ".png"),
-                   drawn(grey, *outcome, lens_or_none, options.size_mm * 1e-3));
+  if (outcome->drawing.empty()) return {};
+  return write_png(outcome->drawing, drawn(grey, *outcome, lens_or_none, options.size_mm * 1e-3));
 }
 
 void detect_all(const DetectOptions& options,
@@ -308,6 +311,17 @@ void hint_at_pattern_ratio(const std::vector<std::string>& families,
         "(AR.js: patternRatio) after the file's name: artoolkit:logo.patt@0.8");
 }
 
+// One for each image, without results yet.
+std::vector<DetectOutcome> outcomes_of(const DetectOptions& options) {
+  const std::vector<std::string> names = names_in_results(options.images);
+  std::vector<std::filesystem::path> drawings(options.images.size());
+  if (!options.draw.empty()) drawings = drawing_files(options.images, options.draw);
+  std::vector<DetectOutcome> outcomes;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    outcomes.push_back({options.images[i], names[i], drawings[i], 0, 0, {}, {}, {}});
+  return outcomes;
+}
+
 Status check_options(const DetectOptions& options) {
   if (options.images.empty()) return usage_error("limn detect: expected images, found none.");
   if (!std::isfinite(options.size_mm) || options.size_mm < 0)
@@ -329,8 +343,7 @@ Status run_detect(const DetectOptions& options) {
     LIMN_TRY(camera, load_imager(options.camera));
   }
   if (!options.draw.empty()) LIMN_TRY_STATUS(make_folder(options.draw));
-  std::vector<DetectOutcome> outcomes;
-  for (const auto& path : options.images) outcomes.push_back({path, 0, 0, {}, {}, {}});
+  std::vector<DetectOutcome> outcomes = outcomes_of(options);
   detect_all(options, camera, *families, &outcomes);
 
   int failed = 0;

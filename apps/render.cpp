@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "apps/output_files.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
@@ -58,7 +59,7 @@ Result<Frames> read_frames(const std::vector<std::string>& arguments, Rig* rig) 
       return usage_error("--frame {}: expected a camera of the rig ({}), found '{}'.", argument,
                          joined_names(rig->cameras), name);
     }
-    LIMN_TRY(cv::Mat image, read_image(file));
+    LIMN_TRY(cv::Mat image, read_image(file, {.used_bits = k_found_in_image}));
     LIMN_TRY_STATUS(accept(image, file, camera));
     frames[static_cast<std::size_t>(camera - rig->cameras.data())] = std::move(image);
   }
@@ -310,6 +311,24 @@ Status write_view(const RenderOptions& options,
   return write_png(options.out / "view.png", both);
 }
 
+// The images that are written must not replace the frames.
+Status check_images(const RenderOptions& options, const Rig& rig, const scene::Scene& scene) {
+  std::vector<NamedFile> written, frames;
+  const auto add = [&](const std::string& name) {
+    written.push_back({"--out", options.out / (name + ".png")});
+  };
+  for (const Imager& camera : rig.cameras) add("composite-" + camera.name);
+  for (const Imager& projector : rig.projectors) {
+    add("projector-" + projector.name);
+    add("clipped-" + projector.name);
+  }
+  for (const scene::Slot& slot : scene.slots) add("mask-" + slot.name);
+  add("view");
+  for (const std::string& frame : options.frames)
+    frames.push_back({"--frame", frame.substr(frame.find('=') + 1)});
+  return check_outputs(written, frames);
+}
+
 }  // namespace
 
 Status run_render(const RenderOptions& options) {
@@ -329,6 +348,7 @@ Status run_render(const RenderOptions& options) {
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(const scene::Scene scene, scene::load_scene(options.scene, &skipped_variants));
   if (!options.poses.empty()) LIMN_TRY_STATUS(check_posed(options.poses, skipped_variants));
+  LIMN_TRY_STATUS(check_images(options, rig, scene));
   LIMN_TRY(const Frames frames, read_frames(options.frames, &rig));
   LIMN_TRY(const scene::PosedScene posed, place(options, scene, rig, frames));
   if (options.poses.empty()) LIMN_TRY_STATUS(check_placed(scene, posed, skipped_variants));

@@ -62,7 +62,7 @@ Status check_strangers(const fs::path& folder,
 
 // Checks for numbered images beyond the patterns' count.
 Status check_surplus(const fs::path& folder, const Patterns& patterns, const std::string& pose) {
-  const fs::path next = folder / image_name(patterns.count());
+  const fs::path next = find_image(folder / image_name(patterns.count()));
   if (!fs::exists(next)) return {};
   return error(
       "{}: expected {} images, {} to {}, as patterns.json says, found more. Other patterns were shown: "
@@ -82,7 +82,7 @@ Result<CapturedPose> read_pose(const CaptureSet& captures, const std::string& na
       const fs::path folder = level_of(captures, name, i) / camera.name;
       LIMN_TRY_STATUS(check_surplus(folder, captures.patterns[i], name));
       for (int k = 0; k < captures.patterns[i].count(); ++k) {
-        files.push_back(folder / image_name(k));
+        files.push_back(find_image(folder / image_name(k)));
         if (!fs::exists(files.back()))
           return error(
               "{}: missing; pose {} needs {} images of {} by {}. Capture the pose again, or leave it out "

@@ -1,71 +1,167 @@
 #include "core/image_io.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <bitset>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/file.h"
+#include "core/image_formats.h"
+#include "core/log.h"
 
 namespace limn {
 namespace {
 
 namespace fs = std::filesystem;
+using image_formats::Format;
+using image_formats::StoredImage;
 
-enum class Kind { png, jpeg, other };
+constexpr std::array k_extensions = {".png", ".jpg", ".jpeg", ".jpe",  ".pbm",  ".pgm", ".ppm",
+                                     ".pnm", ".bmp", ".tif",  ".tiff", ".webp", ".tga"};
 
-Kind kind_of(std::string_view bytes) {
-  if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return Kind::png;
-  if (bytes.starts_with("\xff\xd8\xff")) return Kind::jpeg;
-  return Kind::other;
+std::optional<Format> format_of(std::string_view bytes) {
+  if (bytes.starts_with("\x89PNG\r\n\x1a\n")) return Format::png;
+  if (bytes.starts_with("\xff\xd8\xff")) return Format::jpeg;
+  if (bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
+      std::isspace(static_cast<unsigned char>(bytes[2])))
+    return Format::pnm;
+  if (bytes.starts_with("BM")) return Format::bmp;
+  for (const std::string_view tiff : {"II*\0", "MM\0*", "II+\0", "MM\0+"})
+    if (bytes.starts_with(std::string_view(tiff.data(), 4))) return Format::tiff;
+  if (bytes.starts_with("RIFF") && bytes.substr(std::min<std::size_t>(8, bytes.size())).starts_with("WEBP"))
+    return Format::webp;
+  if (image_formats::is_tga(bytes)) return Format::tga;
+  return std::nullopt;
 }
 
-// Offset after a JPEG's header segments, where the scan starts. Segments are skipped by their length, because
-// thumbnails in APP segments contain markers, too.
-std::size_t jpeg_scan_start(std::string_view bytes) {
-  std::size_t at = 2;
-  while (at + 4 <= bytes.size() && bytes[at] == '\xff' && bytes[at + 1] != '\xda') {
-    at += 2 + 256u * static_cast<unsigned char>(bytes[at + 2]) + static_cast<unsigned char>(bytes[at + 3]);
-  }
-  return at;
+// What a file of another format is, for the message.
+std::string foreign_format(std::string_view bytes) {
+  struct Signature {
+    std::size_t at;
+    std::string_view bytes;
+    const char* name;
+  };
+  static constexpr std::array k_known = {
+      Signature{0, "GIF8", "a GIF"},
+      Signature{0, std::string_view("\0\0\1\0", 4), "an icon (ICO)"},
+      Signature{4, "ftypheic", "a HEIC photograph"},
+      Signature{4, "ftypheix", "a HEIC photograph"},
+      Signature{4, "ftypmif1", "a HEIF or AVIF photograph"},
+      Signature{4, "ftypavif", "an AVIF photograph"},
+      Signature{4, "ftyp", "a video or a camera's raw file"},
+      Signature{0, "\xff\x0a", "a JPEG XL"},
+      Signature{4, "JXL ", "a JPEG XL"},
+      Signature{4, "jP  ", "a JPEG 2000"},
+      Signature{0, "\xff\x4f\xff\x51", "a JPEG 2000"},
+      Signature{0, "\x76\x2f\x31\x01", "an OpenEXR"},
+      Signature{0, "#?RADIANCE", "a Radiance HDR"},
+      Signature{0, "8BPS", "a Photoshop file"},
+      Signature{0, "%PDF", "a PDF"},
+      Signature{0, "P7\n", "a PAM"},
+      Signature{0, "PF\n", "a PFM"},
+      Signature{0, "Pf\n", "a PFM"},
+      Signature{0, "DDS ", "a DDS"},
+      Signature{0, "<svg", "an SVG"},
+      Signature{0, "version https://git-lfs", "a pointer of Git LFS instead of the file"},
+  };
+  if (bytes.empty()) return "an empty file";
+  for (const Signature& known : k_known)
+    if (bytes.size() > known.at && bytes.substr(known.at).starts_with(known.bytes)) return known.name;
+  return fmt::format("{} other bytes", bytes.size());
 }
 
-// A PNG ends in its IEND chunk and a JPEG's scan in an end-of-image marker. Without them cv::imdecode returns
-// the rows that it got and leaves the rest grey or black.
-bool is_complete(std::string_view bytes, Kind kind) {
-  if (kind == Kind::png) return bytes.rfind("IEND") != std::string_view::npos;
-  if (kind == Kind::jpeg) return bytes.find("\xff\xd9", jpeg_scan_start(bytes)) != std::string_view::npos;
-  return true;
+Result<StoredImage> decoded(std::string_view bytes, bool grey) {
+  const auto format = format_of(bytes);
+  if (!format)
+    return error("expected a PNG, JPEG, PGM, PPM, BMP, TIFF, WebP or TGA image, found {}. Save it as PNG.",
+                 foreign_format(bytes));
+  switch (*format) {
+    case Format::png:
+      return image_formats::decode_png(bytes, grey);
+    case Format::jpeg:
+      return image_formats::decode_jpeg(bytes, grey);
+    case Format::pnm:
+      return image_formats::decode_pnm(bytes);
+    case Format::bmp:
+      return image_formats::decode_bmp(bytes);
+    case Format::tiff:
+      return image_formats::decode_tiff(bytes);
+    case Format::webp:
+      return image_formats::decode_webp(bytes);
+    case Format::tga:
+      break;
+  }
+  return image_formats::decode_tga(bytes);
 }
 
-Result<cv::Mat> read(const fs::path& path, int flags) {
-  const auto content = read_file(path);
-  if (!content) return content.error();
-  const std::string& bytes = *content;
-  const Kind kind = kind_of(bytes);
-  if (kind == Kind::other) {
-    return error("{}: expected a PNG or JPEG image, found {}.", path.string(),
-                 bytes.empty() ? std::string("an empty file") : fmt::format("{} other bytes", bytes.size()));
+// The rule of find_used_bits(). An image with alpha comes from no camera.
+int used_bits_of(const StoredImage& image) {
+  if (image.is_stated || image.samples.channels() == 4) return k_full_range;
+  int brightest = 0;
+  bool all_64 = true, all_257 = true;
+  std::bitset<1024> levels;  // used if all samples are multiples of 64
+  for (int y = 0; y < image.samples.rows; ++y) {
+    const auto* row = image.samples.ptr<std::uint16_t>(y);
+    const int count = image.samples.cols * image.samples.channels();
+    for (int k = 0; k < count; ++k) {
+      brightest = std::max<int>(brightest, row[k]);
+      all_64 = all_64 && row[k] % 64 == 0;
+      levels.set(row[k] / 64);
+      all_257 = all_257 && row[k] % 257 == 0;
+    }
   }
-  const Error truncated = error(
-      "{}: expected a complete {} image, found a truncated or damaged one ({} bytes). "
-      "Copy or capture it again.",
-      path.string(), kind == Kind::png ? "PNG" : "JPEG", bytes.size());
-  if (!is_complete(bytes, kind)) return truncated;
-  try {
-    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-    cv::Mat image = cv::imdecode(encoded, flags | cv::IMREAD_IGNORE_ORIENTATION);
-    if (image.empty()) return truncated;
-    if (std::max(image.cols, image.rows) > k_max_image_side)
-      return error("{}: expected at most {} pixels a side, found {}x{}. Make it smaller.", path.string(),
-                   k_max_image_side, image.cols, image.rows);
-    return image;
-  } catch (const cv::Exception&) {
-    return truncated;
+  // A drawing of few levels at the low end may have multiples of 64 alone.
+  constexpr std::size_t k_least_levels = 8;
+  if (all_257 || (all_64 && levels.count() >= k_least_levels)) return k_full_range;
+  for (const int bits : {10, 12, 14})
+    if (brightest < 1 << bits) return bits;
+  return k_full_range;
+}
+
+// The highest eight of the lowest `bits` bits.
+cv::Mat highest_bits(const cv::Mat& samples, int bits) {
+  cv::Mat image(samples.size(), CV_8UC(samples.channels()));
+  const int count = samples.cols * samples.channels();
+  for (int y = 0; y < samples.rows; ++y) {
+    const auto* in = samples.ptr<std::uint16_t>(y);
+    auto* out = image.ptr<std::uint8_t>(y);
+    for (int k = 0; k < count; ++k) out[k] = static_cast<std::uint8_t>(std::min(in[k] >> (bits - 8), 255));
   }
+  return image;
+}
+
+// Levels of 0 to `white` as 8 bits.
+cv::Mat as_8_bits(const StoredImage& stored, int used_bits) {
+  if (stored.samples.depth() == CV_8U && stored.white == 255) return stored.samples;
+  if (stored.samples.depth() == CV_16U) {
+    if (!stored.is_stated)
+      return highest_bits(stored.samples, used_bits == k_found_in_image ? used_bits_of(stored) : used_bits);
+    const auto levels = static_cast<unsigned>(stored.white) + 1;
+    if (std::has_single_bit(levels)) return highest_bits(stored.samples, std::countr_zero(levels));
+  }
+  cv::Mat image;
+  stored.samples.convertTo(image, CV_8U, 255.0 / stored.white);
+  return image;
+}
+
+cv::Mat on_white(const cv::Mat& bgra) {
+  cv::Mat bgr(bgra.size(), CV_8UC3);
+  for (int y = 0; y < bgra.rows; ++y) {
+    const auto* in = bgra.ptr<cv::Vec4b>(y);
+    auto* out = bgr.ptr<cv::Vec3b>(y);
+    for (int x = 0; x < bgra.cols; ++x)
+      for (int k = 0; k < 3; ++k)
+        out[x][k] = static_cast<std::uint8_t>((in[x][k] * in[x][3] + 255 * (255 - in[x][3]) + 127) / 255);
+  }
+  return bgr;
 }
 
 std::uint32_t crc32(std::string_view bytes) {
@@ -106,16 +202,61 @@ constexpr std::size_t k_behind_ihdr = 8 + 25;  // signature, then length + "IHDR
 
 }  // namespace
 
-Result<cv::Mat> read_image(const fs::path& path) { return read(path, cv::IMREAD_ANYCOLOR); }
-
-Result<cv::Mat> read_image_with_alpha(const fs::path& path) {
-  cv::Mat image;
-  LIMN_TRY(image, read(path, cv::IMREAD_UNCHANGED));
-  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257);
-  return image;
+Result<cv::Mat> decode_image(std::string_view bytes, const std::string& name, const ImageOptions& options) {
+  const auto stored = decoded(bytes, options.grey);
+  if (!stored) return error("{}: {}", name, stored.message());
+  if (!stored->note.empty()) log_warning("{}: {}", name, stored->note);
+  cv::Mat image = as_8_bits(*stored, options.used_bits);
+  if (image.channels() == 4 && options.alpha == Alpha::ignored)
+    cv::cvtColor(image, image, cv::COLOR_BGRA2BGR);
+  else if (image.channels() == 4 && (options.grey || options.alpha == Alpha::on_white))
+    image = on_white(image);
+  return options.grey ? to_grey(image) : image;
 }
 
-Result<cv::Mat> read_grey_image(const fs::path& path) { return read(path, cv::IMREAD_GRAYSCALE); }
+Result<cv::Mat> read_image(const fs::path& path, const ImageOptions& options) {
+  LIMN_TRY(const std::string bytes, read_file(path));
+  return decode_image(bytes, path.string(), options);
+}
+
+Result<cv::Mat> read_image_with_alpha(const fs::path& path) {
+  return read_image(path, {.alpha = Alpha::kept});
+}
+
+Result<cv::Mat> read_grey_image(const fs::path& path, int used_bits) {
+  return read_image(path, {.grey = true, .used_bits = used_bits});
+}
+
+Result<int> find_used_bits(const fs::path& path) {
+  LIMN_TRY(const std::string bytes, read_file(path));
+  const auto format = format_of(bytes);
+  constexpr std::size_t k_png_bits = 24;  // offset of the bit depth in a PNG
+  const bool is_16_bit_png = format == Format::png && bytes.size() > k_png_bits && bytes[k_png_bits] == 16;
+  if (!is_16_bit_png && format != Format::tiff && format != Format::pnm) return k_full_range;
+  const auto stored = decoded(bytes, true);
+  if (!stored) return error("{}: {}", path.string(), stored.message());
+  return used_bits_of(*stored);
+}
+
+bool is_image_name(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::find(k_extensions.begin(), k_extensions.end(), extension) != k_extensions.end();
+}
+
+fs::path find_image(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::exists(path, ignored)) return path;
+  for (std::string extension : k_extensions)
+    for (const bool in_capitals : {false, true}) {
+      if (in_capitals) std::transform(extension.begin(), extension.end(), extension.begin(), ::toupper);
+      fs::path other = path;
+      other.replace_extension(extension);
+      if (fs::exists(other, ignored)) return other;
+    }
+  return path;
+}
 
 cv::Mat to_grey(const cv::Mat& image) {
   if (image.channels() == 1) return image;

@@ -7,13 +7,6 @@
 namespace limn::device {
 namespace {
 
-bool is_image(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
-}
-
 Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path& path) {
   namespace fs = std::filesystem;
   std::error_code problem;
@@ -23,12 +16,14 @@ Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path
                  path.string());
   std::vector<fs::path> images;
   for (const auto& entry : fs::directory_iterator(path, problem))
-    if (is_image(entry.path())) images.push_back(entry.path());
+    if (is_image_name(entry.path())) images.push_back(entry.path());
   if (problem)
     return error("{}: cannot be listed: {}. Check its permissions.", path.string(), problem.message());
   if (images.empty())
-    return error("{}: expected .png or .jpg images, found none. Give the folder that contains the frames.",
-                 path.string());
+    return error(
+        "{}: expected images (.png, .jpg, .bmp, .tif, .webp …), found none. Give the folder that contains the "
+        "frames.",
+        path.string());
   std::sort(images.begin(), images.end());
   return images;
 }
@@ -49,7 +44,11 @@ Result<Frame> ImageSequenceCamera::next() {
   if (!options_.repeat && shown_ >= images_.size())
     return error("{}: all {} images have been played.", options_.name, images_.size());
   const std::filesystem::path& path = images_[shown_ % images_.size()];
-  LIMN_TRY(cv::Mat image, read_image(path));
+  if (used_bits_ < k_full_range) {
+    LIMN_TRY(const int used_bits, find_used_bits(path));
+    used_bits_ = std::max(used_bits_, used_bits);
+  }
+  LIMN_TRY(cv::Mat image, read_image(path, {.used_bits = used_bits_}));
   if (image.size() != size_)
     return error(
         "{}: expected {}x{} like the first image of the folder, found {}x{}. Keep other images "

@@ -13,9 +13,9 @@ struct ImageSequenceCameraOptions {
   bool repeat = false;            ///< Whether to start again after the last image instead of ending.
 };
 
-/// A camera that plays stored images: all PNGs and JPEGs of a folder in the order of their names, or one
-/// file. Stamps start at the session clock's zero and advance by the frame period, so that each replay is the
-/// same.
+/// A camera that plays stored images: all images of a folder (is_image_name) in the order of their names, or
+/// one file. Stamps start at the session clock's zero and advance by the frame period, so that each replay is
+/// the same.
 class ImageSequenceCamera : public CameraSource {
  public:
   /// Errors: no such path, no image in the folder, first image unreadable.
@@ -35,6 +35,7 @@ class ImageSequenceCamera : public CameraSource {
   std::vector<std::filesystem::path> images_;
   cv::Size size_;
   std::size_t shown_ = 0;  // number of frames returned so far
+  int used_bits_ = 0;      // of 16-bit images; grows with the brightest so far, so that none is clipped
 };
 
 }  // namespace limn::device

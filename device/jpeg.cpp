@@ -14,10 +14,11 @@ namespace {
 
 constexpr long k_max_pixels = 200'000'000;  // the largest sensors have this; more means a damaged header
 
-// After a warning libjpeg continues. Extra bytes between segments are harmless; other faults damage the
-// image.
+// After a warning libjpeg continues. Extra bytes between segments are harmless, and so is a missing end mark:
+// if data are missing, too, another warning follows. Other faults damage the image.
 bool is_harmless(const std::string& warning) {
-  return warning.find("extraneous bytes before marker") != std::string::npos;
+  return warning.find("extraneous bytes before marker") != std::string::npos ||
+         warning.find("Premature end of JPEG file") != std::string::npos;
 }
 
 using Handle = std::unique_ptr<void, int (*)(tjhandle)>;

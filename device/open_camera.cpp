@@ -2,6 +2,7 @@
 
 #include <filesystem>
 
+#include "core/image_io.h"
 #include "device/gige_camera.h"
 #include "device/image_sequence_camera.h"
 #include "device/mjpeg_camera.h"
@@ -23,13 +24,6 @@ Opened on_heap(Result<Camera> camera) {
   return std::unique_ptr<CameraSource>(std::make_unique<Camera>(std::move(*camera)));
 }
 
-bool is_image(const std::filesystem::path& path) {
-  const std::string extension = path.extension().string();
-  for (const char* known : {".png", ".jpg", ".jpeg", ".PNG", ".JPG", ".JPEG"})
-    if (extension == known) return true;
-  return false;
-}
-
 Opened open_path(const CameraConfig& config) {
   const std::filesystem::path path = config.source;
   std::error_code problem;
@@ -37,7 +31,7 @@ Opened open_path(const CameraConfig& config) {
     return error(
         "{}: expected a source of one of these forms: {}; found {}, which is none of them and no file.",
         config.name, k_forms, config.source.empty() ? "an empty text" : config.source);
-  if (std::filesystem::is_directory(path, problem) || is_image(path))
+  if (std::filesystem::is_directory(path, problem) || is_image_name(path))
     return on_heap(ImageSequenceCamera::open(path, {.name = config.name, .repeat = config.repeat}));
   return on_heap(VideoCamera::open_file(path, {.name = config.name, .grey = config.grey}));
 }

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <map>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string_view>
@@ -21,15 +20,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the bytes of an image are that cannot be read.
-std::string kind_of(std::string_view bytes) {
-  if (bytes.substr(0, 7) == "\xabKTX 20")
-    return "a KTX2 texture (KHR_texture_basisu), which Limn does not read. Switch KTX2 or Basis Universal "
-           "off when you "
-           "export it, or export PNG, JPEG or WebP textures";
-  if (bytes.substr(0, 4) == "DDS ")
-    return "a DDS texture, which Limn does not read. Export PNG, JPEG or WebP textures";
-  return fmt::format("{} bytes of something else. Export the mesh again", bytes.size());
+Alpha alpha_of(bool with_alpha) { return with_alpha ? Alpha::kept : Alpha::ignored; }
+
+// An error for formats of textures that no image reader knows, with the way out.
+Status check_texture_format(std::string_view bytes, const std::string& where) {
+  if (bytes.starts_with("\xabKTX 20"))
+    return error(
+        "{}: expected a PNG, JPEG or WebP as texture, found a KTX2 texture (KHR_texture_basisu), which Limn "
+        "does "
+        "not read. Switch KTX2 or Basis Universal off when you export it.",
+        where);
+  if (bytes.starts_with("DDS "))
+    return error(
+        "{}: expected a PNG, JPEG or WebP as texture, found a DDS texture, which Limn does not read. Export "
+        "PNG, "
+        "JPEG or WebP textures.",
+        where);
+  return {};
 }
 
 Result<cv::Mat> embedded_texture(const EmbeddedImage& embedded, const fs::path& path, bool with_alpha) {
@@ -39,31 +46,20 @@ Result<cv::Mat> embedded_texture(const EmbeddedImage& embedded, const fs::path& 
     cv::cvtColor(embedded.pixels, bgr, cv::COLOR_BGRA2BGR);
     return bgr;
   }
-  cv::Mat image;
-  try {
-    const cv::Mat bytes(1, static_cast<int>(embedded.bytes.size()), CV_8U,
-                        const_cast<char*>(embedded.bytes.data()));
-    if (!embedded.bytes.empty())
-      image = cv::imdecode(bytes, with_alpha ? cv::IMREAD_UNCHANGED : cv::IMREAD_COLOR);
-  } catch (const cv::Exception&) {
-    image.release();
-  }
-  if (image.empty())
-    return error("{}: expected a PNG, JPEG or WebP as embedded texture, found {}.", path.string(),
-                 kind_of(embedded.bytes));
-  if (image.depth() == CV_16U) image.convertTo(image, CV_8U, 1.0 / 257);
-  return image;
+  LIMN_TRY_STATUS(check_texture_format(embedded.bytes, path.string()));
+  return decode_image(embedded.bytes, path.string() + ": embedded texture", {.alpha = alpha_of(with_alpha)});
 }
 
 Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, bool with_alpha) {
-  auto image = with_alpha ? read_image_with_alpha(path) : read_image(path);
-  if (image) return image;
   const auto bytes = read_file(path);
-  const std::string kind = bytes ? kind_of(*bytes) : std::string();
-  if (kind.find("which Limn does not read") != std::string::npos)
-    return error("{}: its texture cannot be read: {}: expected a PNG, JPEG or WebP image, found {}.",
-                 mesh_path.string(), path.string(), kind);
-  return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
+  Result<cv::Mat> image = cv::Mat();
+  if (const Status known = bytes ? check_texture_format(*bytes, path.string()) : Status(bytes.error());
+      !known)
+    image = known.error();
+  else
+    image = decode_image(*bytes, path.string(), {.alpha = alpha_of(with_alpha)});
+  if (!image) return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
+  return image;
 }
 
 // Gives holes the colour of the nearest opaque texel, because texture filtering mixes the two. False when the

@@ -269,7 +269,7 @@ Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
 }
 
 Status load_albedo_image(const fs::path& path, const fs::path& scene_path, Prototype* prototype) {
-  auto image = read_image(path);
+  auto image = read_image(path, {.alpha = Alpha::ignored});
   if (!image) return error("{}: prototype.albedo: {}", scene_path.string(), image.message());
   prototype->albedo_image = std::move(image).value();
   if (prototype->albedo_image.channels() == 1) {

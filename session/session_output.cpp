@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/csv.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/json_text.h"
@@ -64,8 +65,8 @@ void SessionOutput::add_poses(const ComposedFrame& composed) {
     const Eigen::Vector3d mm = 1e3 * pose.translation;
     const Eigen::Quaterniond& q = pose.rotation;
     poses_.add(fmt::format("{:.6f},{},{},{:.4f},{:.4f},{:.4f},{:.8f},{:.8f},{:.8f},{:.8f}\n",
-                           seconds_of(composed.shown_at), part.slot, part.variant, mm.x(), mm.y(), mm.z(),
-                           q.w(), q.x(), q.y(), q.z()),
+                           seconds_of(composed.shown_at), csv_field(part.slot), csv_field(part.variant),
+                           mm.x(), mm.y(), mm.z(), q.w(), q.x(), q.y(), q.z()),
                composed.shown_at);
   }
 }

@@ -342,9 +342,11 @@ struct Series {
   cv::Size size;
   CaptureQualityProbe probe;
   DirectLight direct;
+  int used_bits;  // those of white, so that all images have the same levels
 
   Result<cv::Mat> read(int index) {
-    LIMN_TRY(const cv::Mat image, read_shot(files[static_cast<size_t>(index)], size.width, size.height));
+    LIMN_TRY(const cv::Mat image,
+             read_shot(files[static_cast<size_t>(index)], size.width, size.height, used_bits));
     probe.add_image(index, image);
     return image;
   }
@@ -507,8 +509,8 @@ int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
 
 }  // namespace
 
-Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height) {
-  LIMN_TRY(cv::Mat image, read_grey_image(path));
+Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height, int used_bits) {
+  LIMN_TRY(cv::Mat image, read_grey_image(path, used_bits));
   if (image.cols != width || image.rows != height)
     return error("{}: expected an image of {}x{} pixels, found {}x{}. Capture this pose again.",
                  path.string(), width, height, image.cols, image.rows);
@@ -521,11 +523,13 @@ Result<Decoded> decode(const Patterns& patterns,
                        int height,
                        const DecodeOptions& options) {
   LIMN_CHECK(static_cast<int>(images.size()) == patterns.count());
+  LIMN_TRY(const int used_bits, find_used_bits(images[static_cast<size_t>(patterns.white())]));
   Series series{patterns,
                 images,
                 cv::Size(width, height),
                 CaptureQualityProbe(patterns, width, height),
-                {cv::Mat(height, width, CV_16U, cv::Scalar(0))}};
+                {cv::Mat(height, width, CV_16U, cv::Scalar(0))},
+                used_bits};
   LIMN_TRY(const cv::Mat white, series.read(patterns.white()));
   LIMN_TRY(const cv::Mat black, series.read(patterns.black()));
   const int lowest = patterns.lowest_bit(), block = patterns.block_px();

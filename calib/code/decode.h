@@ -6,6 +6,7 @@
 
 #include "calib/code/capture_quality.h"
 #include "calib/code/patterns.h"
+#include "core/image_io.h"
 #include "core/result.h"
 
 namespace limn::calib {
@@ -67,7 +68,11 @@ Result<Decoded> decode(const Patterns& patterns,
                        int height,
                        const DecodeOptions& options = {});
 
-/// Reads the white image of such a series, as grey.
-Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height);
+/// Reads an image of such a series, as grey. `used_bits` are those of the series' white image
+/// (find_used_bits); white itself needs none.
+Result<cv::Mat> read_shot(const std::filesystem::path& path,
+                          int width,
+                          int height,
+                          int used_bits = k_found_in_image);
 
 }  // namespace limn::calib

@@ -167,8 +167,9 @@ Result<bool> adds_up(const CaptureSet& captures, const Place& at, int index) {
   const Patterns& patterns = captures.patterns[at.projector];
   const CapturedDevice& camera = captures.cameras[at.camera];
   const auto& files = series_of(captures, at);
+  LIMN_TRY(const int used_bits, find_used_bits(files[static_cast<size_t>(patterns.white())]));
   const auto image = [&](int i) -> Result<cv::Mat> {
-    LIMN_TRY(const cv::Mat grey, read_grey_image(files[static_cast<size_t>(i)]));
+    LIMN_TRY(const cv::Mat grey, read_grey_image(files[static_cast<size_t>(i)], used_bits));
     if (grey.cols != camera.width || grey.rows != camera.height)
       return error("{}: expected {}x{} pixels, found {}x{}.", files[static_cast<size_t>(i)].string(),
                    camera.width, camera.height, grey.cols, grey.rows);

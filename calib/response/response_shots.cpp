@@ -63,7 +63,7 @@ Status check_shot(const cv::Mat& shot,
 
 Status check_count(const fs::path& folder) {
   const size_t count = response_images().size();
-  const fs::path beyond = folder / image_name(static_cast<int>(count));
+  const fs::path beyond = find_image(folder / image_name(static_cast<int>(count)));
   if (!fs::exists(beyond)) return {};
   return error("{}: expected {} response images, 000.png to {}, found more. See limn patterns --response.",
                beyond.string(), count, image_name(static_cast<int>(count) - 1));
@@ -136,12 +136,17 @@ Result<ResponseShots> read_response_shots(const CaptureSet& captures, const Resp
   const CapturedDevice& camera = captures.cameras[static_cast<size_t>(pair.camera)];
   ResponseShots shots{pair.projector, pair.camera, folder_of(captures, pair.projector, pair.camera), {}};
   LIMN_TRY_STATUS(check_count(shots.folder));
+  const fs::path white = find_image(shots.folder / image_name(static_cast<int>(images_of(Role::white)[0])));
+  int used_bits = k_full_range;  // reported below if white is missing
+  if (std::error_code ignored; fs::exists(white, ignored)) {
+    LIMN_TRY(used_bits, find_used_bits(white));
+  }
   for (size_t i = 0; i < response_images().size(); ++i) {
-    const fs::path path = shots.folder / image_name(static_cast<int>(i));
+    const fs::path path = find_image(shots.folder / image_name(static_cast<int>(i)));
     if (std::error_code ignored; !fs::exists(path, ignored))
       return error("{}: missing; a response needs {} images (this one shows {}). Capture it again.",
                    path.string(), response_images().size(), response_images()[i].what());
-    LIMN_TRY(cv::Mat shot, read_image(path));
+    LIMN_TRY(cv::Mat shot, read_image(path, {.used_bits = used_bits}));
     LIMN_TRY_STATUS(check_shot(shot, path, camera, shots.images.empty() ? shot : shots.images[0]));
     shots.images.push_back(std::move(shot));
   }

@@ -135,10 +135,11 @@ Result<ShotPair> shots_of(const CaptureSet& captures, const Match& match) {
   const auto& files = captures.poses[static_cast<size_t>(match.pose)].images[projector][camera];
   const Patterns& patterns = captures.patterns[projector];
   const CapturedDevice& device = captures.cameras[camera];
-  LIMN_TRY(cv::Mat white,
-           read_shot(files[static_cast<size_t>(patterns.white())], device.width, device.height));
-  LIMN_TRY(cv::Mat black,
-           read_shot(files[static_cast<size_t>(patterns.black())], device.width, device.height));
+  const auto& white_file = files[static_cast<size_t>(patterns.white())];
+  const auto& black_file = files[static_cast<size_t>(patterns.black())];
+  LIMN_TRY(const int used_bits, find_used_bits(white_file));
+  LIMN_TRY(cv::Mat white, read_shot(white_file, device.width, device.height, used_bits));
+  LIMN_TRY(cv::Mat black, read_shot(black_file, device.width, device.height, used_bits));
   return ShotPair{white, black};
 }
 

@@ -80,7 +80,7 @@ Status train_template(const std::filesystem::path& image,
                        tracker::k_most_pattern_ratio, pattern_ratio);
   if (out.extension() != ".patt")
     return usage_error("--out: expected a file that ends in .patt for a template, found '{}'.", out.string());
-  LIMN_TRY(const cv::Mat pixels, read_image(image));
+  LIMN_TRY(const cv::Mat pixels, read_image(image, {.used_bits = k_found_in_image}));
   const auto trained = tracker::train_template(pixels, pattern_ratio);
   if (!trained) return error("{}: {}", image.string(), trained.message());
   LIMN_TRY_STATUS(write_file(out, tracker::template_text(*trained)));

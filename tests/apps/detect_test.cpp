@@ -4,6 +4,7 @@
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "core/file.h"
@@ -11,6 +12,7 @@
 #include "core/rig.h"
 #include "tests/support/json.h"
 #include "tests/support/matchers.h"
+#include "tests/support/run_limn.h"
 #include "tracker/family.h"
 
 namespace limn::apps {
@@ -114,6 +116,120 @@ TEST_F(Detect, ReadsImagesOfAllDepthsAndChannels) {
   const auto images = test::read_json(options.json)["images"];
   ASSERT_EQ(images.size(), 4u);
   for (const auto& image : images) EXPECT_EQ(image["markers"], images[0]["markers"]) << image["file"];
+}
+
+TEST_F(Detect, ReadsImagesOfAllFormats) {
+  options.images = {folder / "a.png"};
+  for (const char* extension : {".bmp", ".pgm", ".tiff", ".webp", ".jpg"}) {
+    std::vector<uchar> bytes;
+    cv::imencode(extension, image_with_marker(), bytes, {cv::IMWRITE_WEBP_QUALITY, 101});
+    options.images.push_back(folder / (std::string("b") + extension));
+    ASSERT_TRUE(
+        write_file(options.images.back(), {reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+  }
+  const Status status = run_detect(options);
+  ASSERT_TRUE(status) << status.message();
+  const auto images = test::read_json(options.json)["images"];
+  ASSERT_EQ(images.size(), 6u);
+  for (const auto& image : images) {
+    ASSERT_EQ(image["markers"].size(), 1u) << image["file"];
+    EXPECT_NEAR(image["markers"][0]["corners_px"][0][0].get<double>(), 99.5, 0.1) << image["file"];
+  }
+}
+
+TEST_F(Detect, FindsMarkersInBitsAtTheLowEnd) {
+  options.images = {folder / "a.png"};
+  for (const int bits : {10, 12}) {
+    cv::Mat deep;
+    image_with_marker().convertTo(deep, CV_16U, 1 << (bits - 8));
+    options.images.push_back(folder / fmt::format("mono{}.png", bits));
+    ASSERT_TRUE(write_png(options.images.back(), deep));
+  }
+  ASSERT_TRUE(run_detect(options));
+  const auto images = test::read_json(options.json)["images"];
+  ASSERT_EQ(images.size(), 3u);
+  for (const auto& image : images) EXPECT_EQ(image["markers"], images[0]["markers"]) << image["file"];
+}
+
+TEST_F(Detect, ShowsTransparentPaperOnWhite) {
+  cv::Mat bgra;
+  cv::cvtColor(image_with_marker(), bgra, cv::COLOR_GRAY2BGRA);
+  bgra.setTo(cv::Scalar(0, 0, 0, 0), image_with_marker() > 200);  // the paper
+  ASSERT_TRUE(write_png(folder / "sticker.png", bgra));
+  options.images = {folder / "sticker.png"};
+  ASSERT_TRUE(run_detect(options));
+  const auto image = test::read_json(options.json)["images"][0];
+  ASSERT_EQ(image["markers"].size(), 1u);
+  EXPECT_EQ(image["markers"][0]["id"], 7);
+}
+
+TEST_F(Detect, QuotesNamesInCsvAndReplacesBytesThatAreNotUtf8) {
+  options.images.clear();
+  for (const char* name : {"a,b.png", "say \"hi\".png", "caf\xe9 1.png"}) {
+    options.images.push_back(folder / name);
+    ASSERT_TRUE(write_png(options.images.back(), image_with_marker()));
+  }
+  ASSERT_TRUE(run_detect(options));
+  const std::string csv = read_file(options.csv).value();
+  for (const char* row :
+       {"\n\"a,b.png\",apriltag_36h11:7,99.", "\n\"say \"\"hi\"\".png\",apriltag_36h11:7,99.",
+        "\ncaf\xef\xbf\xbd 1.png,apriltag_36h11:7,99."})
+    EXPECT_NE(csv.find(row), std::string::npos) << csv;
+  const auto images = test::read_json(options.json)["images"];
+  EXPECT_EQ(images[0]["file"], "a,b.png");
+  EXPECT_EQ(images[2]["file"], "caf\xef\xbf\xbd 1.png");
+}
+
+TEST_F(Detect, ImagesOfOneNameAreToldApart) {
+  for (const char* side : {"left", "right"}) {
+    ASSERT_TRUE(make_folder(folder / side));
+    ASSERT_TRUE(write_png(folder / side / "000.png", image_with_marker()));
+  }
+  options.images = {folder / "left/000.png", folder / "right/000.png", folder / "a.png"};
+  options.draw = folder / "drawn";
+  ASSERT_TRUE(run_detect(options));
+  const std::string csv = read_file(options.csv).value();
+  for (const std::string& name :
+       {(folder / "left/000.png").string(), (folder / "right/000.png").string(), std::string("a.png")})
+    EXPECT_NE(csv.find("\n" + name + ","), std::string::npos) << csv;
+  for (const char* drawing : {"left-000.png", "right-000.png", "a.png"})
+    EXPECT_TRUE(read_image(options.draw / drawing)) << drawing;
+  EXPECT_EQ(test::read_json(options.json)["images"][1]["drawing"], (options.draw / "right-000.png").string());
+}
+
+TEST_F(Detect, DrawsBesideTheImagesWithoutReplacingThem) {
+  const std::string original = read_file(folder / "a.png").value();
+  std::filesystem::create_hard_link(folder / "a.png", folder / "b.png");
+  std::filesystem::create_symlink("a.png", folder / "c.png");
+  options.images = {folder / "b.png", folder / "c.png", folder / "a.png"};
+  options.draw = folder;
+  ASSERT_TRUE(run_detect(options));
+  for (const char* name : {"a.png", "b.png", "c.png"}) {
+    EXPECT_EQ(read_file(folder / name).value(), original) << name;
+    EXPECT_TRUE(read_image(folder / (std::string(1, *name) + "-drawn.png"))) << name;
+  }
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "c.png"));
+}
+
+TEST_F(Detect, OutputsThatAreInputsAreWrongUsage) {
+  const std::string image = (folder / "a.png").string();
+  const std::string original = read_file(image).value();
+  std::filesystem::create_symlink("a.png", folder / "link.csv");
+  for (const auto& outputs : std::vector<std::vector<std::string>>{
+           {"--csv", image},
+           {"--json", image},
+           {"--csv", (folder / "link.csv").string()},
+           {"--csv", (folder / "x").string(), "--json", (folder / "x").string()}}) {
+    std::vector<std::string> arguments = {"detect", image};
+    arguments.insert(arguments.end(), outputs.begin(), outputs.end());
+    const test::Outcome outcome = test::run_limn(arguments);
+    EXPECT_EQ(outcome.code, 2) << outcome.err;
+    EXPECT_NE(outcome.err.find("expected a file of its own"), std::string::npos) << outcome.err;
+  }
+  const test::Outcome camera = test::run_limn({"detect", image, "--camera", this->camera(320).string(),
+                                               "--json", (folder / "camera.cameramodel").string()});
+  EXPECT_EQ(camera.code, 2) << camera.err;
+  EXPECT_EQ(read_file(image).value(), original);
 }
 
 TEST_F(Detect, FindsNothingInImagesOfNothing) {

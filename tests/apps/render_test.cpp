@@ -101,6 +101,9 @@ TEST(Render, StandsAPartOnAMarkerOfAnImage) {
 
   const cv::Mat out = read_image(folder / "out" / "composite-camera0.png").value();
   ASSERT_EQ(out.size(), cv::Size(800, 600));
+  RenderOptions again = options;  // the frame is not replaced by the composite
+  again.frames = {"camera0=" + (folder / "out" / "composite-camera0.png").string()};
+  EXPECT_TRUE(run_render(again).error().wrong_usage);
   // The flag's true tip: the flag on one side of it, paper on the other.
   const auto at = [&](const Vector3d& p_marker) {
     const Vector2d px = *rig.cameras[0].project(camera_from_marker * p_marker);

@@ -306,6 +306,25 @@ TEST(Decode, CallsPixelsUnlitThatReflectionsAloneReach) {
   EXPECT_EQ(decoded->lit, 0);
 }
 
+// 12 bits at the low end of 16: black alone looks like 10 bits, but white decides for the whole series.
+TEST(Decode, ASeriesOf12BitsIsDecodedLikeOneOf8) {
+  Bench bench;
+  bench.noise = 1.0;
+  const auto files = bench.photograph(test::test_folder());
+  const auto expected = decode(bench.patterns, files, k_width, k_height);
+  ASSERT_TRUE(expected.ok()) << expected.message();
+  for (const fs::path& file : files) {
+    cv::Mat deep;
+    read_image(file).value().convertTo(deep, CV_16U, 16, 5);
+    ASSERT_TRUE(write_png(file, deep).ok());
+  }
+  ASSERT_EQ(find_used_bits(files[static_cast<size_t>(bench.patterns.black())]).value(), 10);
+  const auto decoded = decode(bench.patterns, files, k_width, k_height);
+  ASSERT_TRUE(decoded.ok()) << decoded.message();
+  EXPECT_EQ(decoded->decoded, expected->decoded);
+  EXPECT_EQ(cv::norm(decoded->contrast, expected->contrast, cv::NORM_INF), 0);
+}
+
 TEST(Decode, SurvivesNoiseAtLowContrast) {
   Bench bench;
   bench.black = 10;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
 #include "core/image_io.h"
@@ -33,6 +34,19 @@ TEST(ImageSequenceCamera, PlaysAFolderInTheOrderOfNamesAndEnds) {
     EXPECT_NEAR(seconds_between(Stamp{}, frame->captured_at), i / 20.0, 1e-9);
   }
   EXPECT_FALSE(camera->next());
+}
+
+TEST(ImageSequenceCamera, PlaysTiffsAndKeepsTheScaleOf12Bits) {
+  const fs::path folder = test_folder();
+  for (const auto& [name, level] : {std::pair{"0.tif", 3210}, {"1.TIFF", 165}}) {
+    std::vector<uchar> bytes;
+    cv::imencode(".tiff", cv::Mat(6, 8, CV_16U, cv::Scalar(level)), bytes);
+    ASSERT_TRUE(write_file(folder / name, {reinterpret_cast<const char*>(bytes.data()), bytes.size()}));
+  }
+  auto camera = device::ImageSequenceCamera::open(folder);
+  ASSERT_TRUE(camera) << camera.message();
+  EXPECT_EQ(camera->next().value().image.at<std::uint8_t>(0, 0), 200);
+  EXPECT_EQ(camera->next().value().image.at<std::uint8_t>(0, 0), 10) << "a dark image after a bright one";
 }
 
 TEST(ImageSequenceCamera, RepeatsWhenAskedTo) {

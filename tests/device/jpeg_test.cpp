@@ -79,6 +79,16 @@ TEST(Jpeg, TablesThatWebcamsLeaveOutAreTheStandards) {
   EXPECT_TRUE(test::image_near(*image, ramp(), 2, 16, "bare"));
 }
 
+TEST(Jpeg, AnImageWithoutEndMarkIsWhole) {
+  auto bytes = encoded(ramp());
+  const cv::Mat whole = decode_jpeg(bytes).value();
+  bytes.resize(bytes.size() - 2);
+  const auto image = decode_jpeg(bytes);
+  ASSERT_TRUE(image) << image.message();
+  EXPECT_TRUE(test::image_near(*image, whole, 0, 0, "image"));
+  EXPECT_TRUE(decode_frame({bytes.begin(), bytes.end()}));
+}
+
 TEST(Jpeg, NoHalfImages) {
   const auto bytes = encoded(ramp());
   for (const std::size_t size :
