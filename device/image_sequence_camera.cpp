@@ -21,7 +21,8 @@ Result<std::vector<std::filesystem::path>> images_of(const std::filesystem::path
     return error("{}: cannot be listed: {}. Check its permissions.", path.string(), problem.message());
   if (images.empty())
     return error(
-        "{}: expected images (.png, .jpg, .bmp, .tif, .webp …), found none. Give the folder that contains the "
+        "{}: expected images (.png, .jpg, .bmp, .tif, .webp …), found none. Give the folder that contains "
+        "the "
         "frames.",
         path.string());
   std::sort(images.begin(), images.end());
