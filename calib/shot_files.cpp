@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <map>
 #include <optional>
 #include <regex>
-#include <set>
 
+#include "core/image_io.h"
 #include "core/names.h"
 
 namespace limn::calib {
@@ -59,15 +58,6 @@ std::vector<std::string> separated(const std::string& text, char separator) {
   return parts;
 }
 
-bool is_image(const std::string& name) {
-  static const std::set<std::string> k_endings = {".png",  ".jpg", ".jpeg", ".jpe", ".bmp", ".tif",
-                                                  ".tiff", ".pgm", ".ppm",  ".pnm", ".webp"};
-  std::string ending = fs::path(name).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return k_endings.count(ending) > 0;
-}
-
 // A file with what the pattern's wildcards stand for, without the name's ending.
 struct Shot {
   fs::path path;
@@ -86,12 +76,12 @@ std::vector<Shot> shots_in(const fs::path& folder, const std::string& pattern) {
   }
   std::vector<Shot> shots;
   for (const std::string& name : names_in(folder, pattern, false)) {
-    if (!is_image(name)) continue;
+    if (!is_image_name(name)) continue;
     std::vector<std::string> parts;
     match(pattern.c_str(), name.c_str(), &parts);
     std::string variable;
     for (const std::string& part : parts) variable += (variable.empty() ? "" : "_") + part;
-    if (is_image(variable)) variable = fs::path(variable).stem().string();
+    if (is_image_name(variable)) variable = fs::path(variable).stem().string();
     shots.push_back({folder / name, variable});
   }
   return shots;

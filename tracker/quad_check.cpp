@@ -135,7 +135,8 @@ bool may_be_uncovered_code(const cv::Mat& grey, const Quad& quad, const Families
   bool has_border = false;
   return std::ranges::any_of(families.codes(), [&](const CodeFamily& family) {
     const auto side = static_cast<std::size_t>(family.cells) + 2;
-    if (can_be_covered(family) || family.border_cells != 1 || side > k_most_side) return false;
+    if (can_be_covered(family) || family.border_cells != 1 || family.grid.rings > 0 || side > k_most_side)
+      return false;
     if (family.cells != last_cells) {
       last_cells = family.cells;
       std::array<std::array<float, k_most_side * k_most_side>, 2> at;
