@@ -24,11 +24,6 @@ struct SolveCommandOptions {
   /// of capture.json.
   std::vector<std::string> scale_bar_lengths = {};
 };
-std::string projector = {};  ///< the projector's size, "1024x768"
-std::string board = {};      ///< "chessboard:9x7:75mm"
-std::string poses = "pose*";
-std::string shots = "*.png";
-};
 
 /// Solves captures and writes the rig folder (rig.json, .cameramodel files, report.json, report.html,
 /// observations.json). If the solve fails, at most report.json is written, with the faults that explain it.
