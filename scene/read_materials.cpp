@@ -58,7 +58,13 @@ Result<cv::Mat> texture_beside(const fs::path& path, const fs::path& mesh_path, 
     image = known.error();
   else
     image = decode_image(*bytes, path.string(), {.alpha = alpha_of(with_alpha)});
-  if (!image) return error("{}: its texture cannot be read: {}", mesh_path.string(), image.message());
+  if (!image) {
+    const bool is_webp = bytes && bytes->starts_with("RIFF");
+    return error("{}: its texture cannot be read: {}{}", mesh_path.string(), image.message(),
+                 is_webp
+                     ? " If that does not help, switch WebP (EXT_texture_webp) off when you export the mesh."
+                     : "");
+  }
   return image;
 }
 
