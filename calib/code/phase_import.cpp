@@ -21,7 +21,7 @@ constexpr float k_unknown = std::numeric_limits<float>::quiet_NaN();
 constexpr double k_full_turn = 2 * std::numbers::pi;
 constexpr int k_own_period_px = 32, k_own_steps = 6;  // the images that are written
 constexpr float k_least_amplitude = 4;                // levels; below, noise turns the phase by a quarter
-constexpr float k_of_brightest = 0.06;  // share of the brightest amplitudes: light of the projector
+constexpr float k_of_brightest = 0.06F;  // share of the brightest amplitudes: light of the projector
 constexpr double k_most_off =
     0.15;  // median distance of a wave from what the coarser one says, share of a wave
 

@@ -118,7 +118,7 @@ FaultBench FaultBench::create(const std::string& name, int poses) {
   const std::filesystem::path config = std::filesystem::path(LIMN_SOURCE_DIR) / "config";
   FaultBench bench;
   bench.world = sim::load_world(config / "worlds" / (name + ".json"), [](const MarkerName&) {
-                  return Result<cv::Mat>(cv::Mat(8, 8, CV_8U, cv::Scalar(0)));
+                  return Result<MarkerDrawing>(MarkerDrawing{cv::Mat(8, 8, CV_8U, cv::Scalar(0))});
                 }).value();
   for (Imager& camera : bench.world.rig.cameras) shrink(&camera);
   for (Imager& projector : bench.world.rig.projectors) shrink(&projector);

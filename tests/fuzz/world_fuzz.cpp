@@ -5,7 +5,9 @@
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   using namespace limn;
   const auto file = test::fuzzed_file(bytes, size, "world.json");
-  const auto blank = [](const MarkerName&) -> Result<cv::Mat> { return cv::Mat(6, 6, CV_8U, cv::Scalar(0)); };
+  const auto blank = [](const MarkerName&) -> Result<MarkerDrawing> {
+    return MarkerDrawing{cv::Mat(6, 6, CV_8U, cv::Scalar(0))};
+  };
   const auto world = sim::load_world(file, blank);
   test::check_read(world, file);
   if (!world) return 0;

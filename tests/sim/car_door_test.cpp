@@ -18,7 +18,9 @@ namespace fs = std::filesystem;
 
 const fs::path k_config = fs::path(LIMN_SOURCE_DIR) / "config";
 
-Result<cv::Mat> plain_marker(const MarkerName&) { return cv::Mat(6, 6, CV_8U, cv::Scalar(0)); }
+Result<MarkerDrawing> plain_marker(const MarkerName&) {
+  return MarkerDrawing{cv::Mat(6, 6, CV_8U, cv::Scalar(0))};
+}
 
 void expect_same_mesh(const scene::Mesh& found, const scene::Mesh& expected, const std::string& name) {
   ASSERT_EQ(found.positions.size(), expected.positions.size()) << name;

@@ -16,10 +16,10 @@ namespace fs = std::filesystem;
 const fs::path k_worlds = fs::path(LIMN_SOURCE_DIR) / "config" / "worlds";
 
 // A substitute for the tracker's families: black with a white middle.
-Result<cv::Mat> plain_marker(const MarkerName&) {
+Result<MarkerDrawing> plain_marker(const MarkerName&) {
   cv::Mat image = cv::Mat::zeros(6, 6, CV_8U);
   image(cv::Rect(2, 2, 2, 2)) = 255;
-  return image;
+  return MarkerDrawing{image};
 }
 
 Result<sim::World> loaded(std::string text) {
