@@ -90,7 +90,7 @@ void observe_place(const DescribedRig& described,
   for (std::size_t p = 0; p < described.rig.projectors.size(); ++p) {
     const Imager& projector = described.rig.projectors[p];
     for (int cell = 0; cell < 4 * board.columns * board.rows; ++cell) {  // cells of half a square
-      const auto middle = [&](int half) {                                // of a half square
+      const auto middle = [&](int half) {                                // its middle
         const double from = board.p_line(half / 2), to = board.p_line(half / 2 + 1);
         return from + (half % 2 == 0 ? 0.25 : 0.75) * (to - from);
       };

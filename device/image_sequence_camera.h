@@ -35,7 +35,7 @@ class ImageSequenceCamera : public CameraSource {
   std::vector<std::filesystem::path> images_;
   cv::Size size_;
   std::size_t shown_ = 0;  // number of frames returned so far
-  int used_bits_ = 0;      // of 16-bit images; grows with the brightest so far, so that none is clipped
+  int used_bits_ = 0;      // bits of 16-bit samples; grows with the brightest so far, so that none is clipped
 };
 
 }  // namespace limn::device

@@ -6,6 +6,7 @@
 #include <array>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/image_io.h"
 
@@ -14,12 +15,33 @@ namespace {
 
 constexpr long k_max_pixels = 200'000'000;  // the largest sensors have this; more means a damaged header
 
-// After a warning libjpeg continues. Extra bytes between segments are harmless, and so is a missing end mark:
-// if data are missing, too, another warning follows. Other faults damage the image.
+// After a warning libjpeg continues. Extra bytes between segments are harmless; other faults damage the
+// image.
 bool is_harmless(const std::string& warning) {
-  return warning.find("extraneous bytes before marker") != std::string::npos ||
-         warning.find("Premature end of JPEG file") != std::string::npos;
+  return warning.find("extraneous bytes before marker") != std::string::npos;
 }
+
+// A JPEG that has its end mark. Some webcams leave it out; with it, libjpeg tells whether data are missing,
+// too.
+class EndedJpeg {
+ public:
+  explicit EndedJpeg(std::span<const std::uint8_t> bytes) : bytes_(bytes) {
+    static constexpr std::array<std::uint8_t, 2> k_end = {0xff, 0xd9};
+    constexpr std::size_t k_most_padding = 64;  // bytes behind the end mark
+    const auto tail = bytes.last(std::min(bytes.size(), k_most_padding + k_end.size()));
+    if (std::search(tail.begin(), tail.end(), k_end.begin(), k_end.end()) != tail.end()) return;
+    copy_.assign(bytes.begin(), bytes.end());
+    copy_.insert(copy_.end(), k_end.begin(), k_end.end());
+    bytes_ = copy_;
+  }
+  EndedJpeg(const EndedJpeg&) = delete;
+  EndedJpeg& operator=(const EndedJpeg&) = delete;
+  std::span<const std::uint8_t> bytes() const { return bytes_; }
+
+ private:
+  std::vector<std::uint8_t> copy_;
+  std::span<const std::uint8_t> bytes_;
+};
 
 using Handle = std::unique_ptr<void, int (*)(tjhandle)>;
 
@@ -121,7 +143,9 @@ Result<cv::Size> jpeg_size(std::span<const std::uint8_t> bytes) {
   return cv::Size(width, height);
 }
 
-Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptions& options) {
+Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> stored, const JpegOptions& options) {
+  const EndedJpeg ended(stored);
+  const std::span bytes = ended.bytes();
   const Handle decoder = new_decoder();
   LIMN_TRY(const Header header, read_header(bytes, options, decoder));
   const bool grey = options.grey || header.colours == TJCS_GRAY;
@@ -133,7 +157,8 @@ Result<cv::Mat> decode_jpeg(std::span<const std::uint8_t> bytes, const JpegOptio
 }
 
 Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options) {
-  const std::span bytes(reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size());
+  const EndedJpeg ended({reinterpret_cast<const std::uint8_t*>(jpeg.data()), jpeg.size()});
+  const std::span bytes = ended.bytes();
   const Handle decoder = new_decoder();
   LIMN_TRY(const Header header, read_header(bytes, options, decoder));
   Frame frame;

@@ -61,7 +61,7 @@ constexpr std::array<double, 3> k_limits = {k_middle, 0.35, 0.22};
 // Samples as fractions of the way from black to white, at one or five places of every cell, border included.
 struct CellSamples {
   int cells = 0;  // cells along a side, border included
-  int rings = 0;  // of these, outside of the square
+  int rings = 0;  // those of them that are outside of the square
   bool several = false;
   Fractions fraction;
 

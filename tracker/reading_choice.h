@@ -19,7 +19,7 @@ struct Pattern {
   std::uint64_t code = 0;
   const TemplatePattern* drawn = nullptr;  // a template instead of a code
   std::size_t rotation = 0;                // the template's
-  const CodeGrid* grid = nullptr;          // of a code with cells around its square
+  const CodeGrid* grid = nullptr;          // grid of a code with cells around its square
 
   bool operator==(const Pattern&) const = default;
 

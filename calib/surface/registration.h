@@ -89,10 +89,11 @@ std::vector<float> residuals(const scene::MeshBvh& index,
 
 /// How much of the scan and of the mesh lie on each other.
 struct Overlap {
-  double scan_share = 0;  ///< of the scan's points, one for each cell of the fit, near the mesh
-  double mesh_share = 0;  ///< of the mesh's area, near the scan; at most about half for a scan of one side
-  double near_m = 0;      ///< the distance that counts as near: 1 % of the mesh's diagonal, at least 3 mm
-  int scan_points = 0;    ///< number of points that scan_share is a share of
+  double scan_share = 0;  ///< share of the scan's points, one for each cell of the fit, near the mesh
+  double mesh_share =
+      0;                ///< share of the mesh's area near the scan; at most about half for a scan of one side
+  double near_m = 0;    ///< the distance that counts as near: 1 % of the mesh's diagonal, at least 3 mm
+  int scan_points = 0;  ///< number of points that scan_share is a share of
 };
 
 /// Measures it at the registration's pose. Near means on the same side of both surfaces, too.

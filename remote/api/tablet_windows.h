@@ -22,7 +22,7 @@ namespace limn::remote {
 constexpr std::chrono::milliseconds k_frame_timeout{10000};
 /// Windows that are open at once.
 constexpr std::ptrdiff_t k_max_windows = 8;
-/// Of these a guest can have so many that others find a place.
+/// A guest can have so many of them that others find a place.
 constexpr std::ptrdiff_t k_max_windows_of_guest = 2;
 
 /// Tells the session the viewpoint of a guest's tablet, by each image; nullopt: the guest's last window is

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <opencv2/imgproc.hpp>
 
 #include "calib/capture.h"
 #include "core/file.h"
@@ -146,11 +147,14 @@ TEST(CaptureSet, AFailingCameraAndAnotherModeAreErrors) {
 
 TEST(CaptureSet, ImportTakesForeignNames) {
   const fs::path folder = test::test_folder() / "photos";
+  const Patterns patterns = Patterns::create(PatternCode::gray, 4, 4).value();
   for (const char* pose : {"capture_2", "capture_10", "other"}) {
     ASSERT_TRUE(make_folder(folder / pose).ok());
-    for (int i = 0; i < 10; ++i)
-      ASSERT_TRUE(
-          write_png(folder / pose / fmt::format("gray_{}.png", i), cv::Mat(6, 9, CV_8U, cv::Scalar(i))).ok());
+    for (int i = 0; i < 10; ++i) {
+      cv::Mat seen;
+      cv::resize(patterns.image(i), seen, {90, 60}, 0, 0, cv::INTER_NEAREST);
+      ASSERT_TRUE(write_png(folder / pose / fmt::format("gray_{}.png", i), 20 + 0.7 * seen).ok());
+    }
   }
   ForeignCaptureSet foreign{folder,       4, 4, Board::parse("chessboard:9x7:75mm").value(), "capture_*",
                             "gray_*.png", {}};
@@ -159,7 +163,7 @@ TEST(CaptureSet, ImportTakesForeignNames) {
   ASSERT_EQ(read->poses.size(), 2U);
   EXPECT_EQ(read->poses[0].name, "capture_2");  // sorted as numbers
   EXPECT_EQ(read->poses[1].images[0][0][9].filename(), "gray_9.png");
-  EXPECT_EQ(read->cameras[0].width, 9);
+  EXPECT_EQ(read->cameras[0].width, 90);
   foreign.projector_width = 1024;
   EXPECT_NE(import_opencv_gray(foreign).message().find("expected 26 images"), std::string::npos);
   foreign.poses = "nothing*";

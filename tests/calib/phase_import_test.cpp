@@ -171,11 +171,11 @@ TEST(PhaseImport, AWrongFormIsNamedWithTheRightOne) {
   WaveBench waves;
   waves.series.column_periods = {96, 16};
   waves.series.wave = WaveForm::sine;
-  const auto files = waves.photograph(test::test_folder() / "photos");
+  const fs::path folder = test::test_folder();
+  const auto files = waves.photograph(folder / "photos");
   PhaseSeries wrong = waves.series;
   wrong.wave = WaveForm::cosine;
-  const auto read =
-      recoded(wrong, files, WaveBench::k_width, WaveBench::k_height, test::test_folder() / "made");
+  const auto read = recoded(wrong, files, WaveBench::k_width, WaveBench::k_height, folder / "made");
   ASSERT_FALSE(read.ok());
   EXPECT_NE(read.message().find("--wave=sin"), std::string::npos) << read.message();
 }

@@ -163,9 +163,10 @@ TEST(ShotOrder, OfShuffledImagesIsAnError) {
 }
 
 TEST(ShotOrder, OfDarkImagesIsAssumedToBeOpenCvs) {
+  const fs::path folder = test::test_folder();
   std::vector<fs::path> files;
   for (int i = 0; i < 26; ++i) {
-    files.push_back(test::test_folder() / image_name(i));
+    files.push_back(folder / image_name(i));
     ASSERT_TRUE(write_png(files.back(), cv::Mat(120, 160, CV_8U, cv::Scalar(7))).ok());
   }
   const auto found = find_shot_order({files}, 64, 64);

@@ -30,7 +30,7 @@ struct AlignOptions {
 /// The result of an alignment.
 struct MeshAligned {
   calib::Registration registration;
-  calib::Overlap overlap;             ///< of the scan and the mesh; zeros without a scan
+  calib::Overlap overlap;             ///< scan and mesh; zeros without a scan
   std::string how;                    ///< where the start came from
   std::vector<std::string> warnings;  ///< symmetry, undetermined directions, differences of CAD and scan
 };
