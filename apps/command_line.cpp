@@ -718,9 +718,10 @@ CLI::App* add_import_rig(CLI::App* import, Run& run) {
              "Unit of the file's lengths, where it does not say: that of the board's squares");
   command->add_option("--camera-size", options->camera_size,
                       "Size of the camera's images in pixels, such as 1280x960, where the file does not say");
-  command->add_option("--projector", options->projector_size,
-                      "Likewise of the projector. OpenCV's stereo calibration: the second device is a projector "
-                      "of this size, not a camera");
+  command->add_option(
+      "--projector", options->projector_size,
+      "Likewise of the projector. OpenCV's stereo calibration: the second device is a projector "
+      "of this size, not a camera");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each device");
   command->callback([options, &run] { run = [options] { return report_result(run_import_rig(*options)); }; });
   return command;

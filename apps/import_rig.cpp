@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "core/json_text.h"
@@ -22,7 +23,8 @@ Result<std::optional<std::array<int, 2>>> size_given(const std::string& text, co
 
 // Distance in mm between the centres of two devices.
 double distance_mm(const Imager& a, const Imager& b) {
-  return 1000 * (a.imager_from_world.inverse().translation - b.imager_from_world.inverse().translation).norm();
+  return 1000 *
+         (a.imager_from_world.inverse().translation - b.imager_from_world.inverse().translation).norm();
 }
 
 nlohmann::ordered_json entry_of(const Imager& device, const Imager& first) {
@@ -43,8 +45,8 @@ void print_device(const Imager& device, const Imager& first) {
   const std::string distance =
       &device == &first ? std::string()
                         : fmt::format(", {:.1f} mm from {}", distance_mm(device, first), first.name);
-  print_out("{}: {}x{}, focal length {:.1f} px{}\n", device.name, device.width, device.height, device.lens.fx(),
-            distance);
+  print_out("{}: {}x{}, focal length {:.1f} px{}\n", device.name, device.width, device.height,
+            device.lens.fx(), distance);
 }
 
 }  // namespace

@@ -66,9 +66,10 @@ Result<NumberTable> number_table(const RigEntry& entry) {
 Result<Eigen::Matrix3d> matrix_in(const RigEntry& entry) {
   LIMN_TRY(const NumberTable table, number_table(entry));
   if (table.numbers.size() != 9 || (table.rows != 3 && table.rows != 1))
-    return rig_entry_error(
-        entry, fmt::format("expected 3 x 3 numbers, found {} x {}.", table.rows, table.columns));
-  return Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(table.numbers.data()));
+    return rig_entry_error(entry,
+                           fmt::format("expected 3 x 3 numbers, found {} x {}.", table.rows, table.columns));
+  return Eigen::Matrix3d(
+      Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(table.numbers.data()));
 }
 
 Result<std::vector<double>> vector_in(const RigEntry& entry) {
@@ -87,14 +88,13 @@ Result<int> side_in_pixels(const RigEntry& entry, double side) {
 
 Result<Eigen::Quaterniond> rotation_in(const RigEntry& entry, const Eigen::Matrix3d& matrix) {
   constexpr double k_rounded = 1e-3;
-  const double worst =
-      (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  const double worst = (matrix * matrix.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (worst <= k_rounded && matrix.determinant() > 0) return Eigen::Quaterniond(matrix).normalized();
   return rig_entry_error(
-      entry,
-      fmt::format("expected a rotation (rows of length 1 at right angles, determinant 1), found rows that are "
-                  "off by {:g} and the determinant {:g}.",
-                  worst, matrix.determinant()));
+      entry, fmt::format(
+                 "expected a rotation (rows of length 1 at right angles, determinant 1), found rows that are "
+                 "off by {:g} and the determinant {:g}.",
+                 worst, matrix.determinant()));
 }
 
 Result<Eigen::Vector3d> translation_in(const RigEntry& entry, const Eigen::Vector3d& metres) {

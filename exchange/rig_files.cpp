@@ -92,8 +92,8 @@ Status read_pair_size(const DataNode& map, const DeviceKeys& keys, CameraDescrip
   const RigEntry entry{keys.shape, shape};
   LIMN_TRY(const std::vector<double> numbers, vector_in(entry));
   if (numbers.size() != 2 && numbers.size() != 3)  // the third is the number of channels
-    return rig_entry_error(entry,
-                           fmt::format("expected the image's height and width, found {} numbers.", numbers.size()));
+    return rig_entry_error(
+        entry, fmt::format("expected the image's height and width, found {} numbers.", numbers.size()));
   LIMN_TRY(device->height, side_in_pixels(entry, numbers[0]));
   LIMN_TRY(device->width, side_in_pixels(entry, numbers[1]));
   return {};
@@ -146,11 +146,13 @@ Result<RigFile> read_pair(const PairFormat& format, const DataNode& map, const R
 
 // ---- OpenCV's stereo calibration ----
 
-const Keys k_rotation_names = {"r",       "rot",     "rmat",    "rotation", "rotationmatrix", "stereorotation",
-                               "stereor", "rstereo", "matrixr", "rmatrix",  "extrinsicsr",    "extrinsicr"};
-const Keys k_translation_names = {"t",       "trans",   "tvec",    "translation", "translationvector",
-                                  "stereot", "rstereot", "tstereo", "vectort",     "translationmatrix",
-                                  "stereotranslation", "tvector", "extrinsicst", "extrinsict"};
+const Keys k_rotation_names = {
+    "r",       "rot",     "rmat",    "rotation", "rotationmatrix", "stereorotation",
+    "stereor", "rstereo", "matrixr", "rmatrix",  "extrinsicsr",    "extrinsicr"};
+const Keys k_translation_names = {
+    "t",           "trans",     "tvec",    "translation",       "translationvector", "stereot",
+    "rstereot",    "tstereo",   "vectort", "translationmatrix", "stereotranslation", "tvector",
+    "extrinsicst", "extrinsict"};
 
 std::optional<RigEntry> entry_named(const DataNode& map, const Keys& names) {
   for (std::size_t i = 0; i < map.keys.size(); ++i)
@@ -170,8 +172,8 @@ Result<RigFile> read_stereo(std::vector<CameraDescription> cameras,
   RigFile file;
   file.program = "OpenCV stereo";
   if (is_right(cameras[0]) && !is_right(cameras[1])) std::swap(cameras[0], cameras[1]);
-  LIMN_TRY(cameras[1].imager_from_world, pair_pose(*entry_named(map, k_rotation_names),
-                                                   *entry_named(map, k_translation_names), options));
+  LIMN_TRY(cameras[1].imager_from_world,
+           pair_pose(*entry_named(map, k_rotation_names), *entry_named(map, k_translation_names), options));
   const bool has_projector = options.projector_size.has_value();
   // An image size that both devices share is the camera's.
   if (has_projector) cameras[1].width = cameras[1].height = 0;
@@ -185,7 +187,8 @@ Result<RigFile> read_stereo(std::vector<CameraDescription> cameras,
 
 std::string first_entries(const DataNode& root) {
   // XML has one outermost element.
-  const DataNode& map = root.is_map() && root.items.size() == 1 && root.items[0].is_map() ? root.items[0] : root;
+  const DataNode& map =
+      root.is_map() && root.items.size() == 1 && root.items[0].is_map() ? root.items[0] : root;
   if (!map.is_map()) return "something else";
   constexpr std::size_t k_most = 8;
   Keys keys;
@@ -237,8 +240,8 @@ Result<RigFile> read_poses_of_mpcdi(const std::filesystem::path& path, const Rig
 }
 
 bool is_mpcdi(const std::filesystem::path& path, const std::string& bytes) {
-  return (bytes.starts_with("PK") && path.extension() != ".npz") || bytes.find("<MPCDI") != std::string::npos ||
-         bytes.find("<mpcdi") != std::string::npos;
+  return (bytes.starts_with("PK") && path.extension() != ".npz") ||
+         bytes.find("<MPCDI") != std::string::npos || bytes.find("<mpcdi") != std::string::npos;
 }
 
 Result<DataNode> parse_rig_file(const std::string& bytes) {

@@ -14,9 +14,9 @@ namespace limn::exchange {
 
 /// What files of other programs do not say about a rig.
 struct RigFileOptions {
-  std::optional<scene::LengthUnit> units;             ///< Unit of the file's translations.
-  std::optional<std::array<int, 2>> camera_size;      ///< Width and height in pixels.
-  std::optional<std::array<int, 2>> projector_size;   ///< Likewise. OpenCV: the second device is a projector.
+  std::optional<scene::LengthUnit> units;            ///< Unit of the file's translations.
+  std::optional<std::array<int, 2>> camera_size;     ///< Width and height in pixels.
+  std::optional<std::array<int, 2>> projector_size;  ///< Likewise. OpenCV: the second device is a projector.
 };
 
 /// A rig that another program calibrated.

@@ -32,12 +32,16 @@ Result<RigEntry> member_entry(const RigEntry& outer, const std::string& name) {
 }
 
 // A matrix that is stored column by column, of exactly this size.
-Result<Eigen::MatrixXd> matrix_by_columns(const RigEntry& outer, const std::string& name, int rows, int columns) {
+Result<Eigen::MatrixXd> matrix_by_columns(const RigEntry& outer,
+                                          const std::string& name,
+                                          int rows,
+                                          int columns) {
   LIMN_TRY(const RigEntry entry, member_entry(outer, name));
   const auto problem = [&](const std::string& found) {
-    return rig_entry_error(entry, fmt::format("expected {} x {} finite numbers (ValuesByColumn), found {}. Was "
-                                              "the ensemble calibrated?",
-                                              rows, columns, found));
+    return rig_entry_error(entry,
+                           fmt::format("expected {} x {} finite numbers (ValuesByColumn), found {}. Was "
+                                       "the ensemble calibrated?",
+                                       rows, columns, found));
   };
   const DataNode* lists = member_of(*entry.node, "ValuesByColumn");
   if (!lists) return problem("none");
@@ -134,12 +138,10 @@ Result<RigFile> read_roomalive(const DataNode& root, const RigFileOptions& optio
   file.program = "RoomAlive Toolkit";
   for (const bool is_projector : {false, true}) {
     LIMN_TRY(const RigEntry list, member_entry(ensemble, is_projector ? "projectors" : "cameras"));
-    if (list.node->items.empty())
-      return rig_entry_error(list, "expected at least one device, found none.");
+    if (list.node->items.empty()) return rig_entry_error(list, "expected at least one device, found none.");
     for (std::size_t i = 0; i < list.node->items.size(); ++i) {
       const RigEntry entry{fmt::format("{}.{}", list.path, i), &list.node->items[i]};
-      LIMN_TRY(CameraDescription device,
-               is_projector ? read_ensemble_projector(entry) : read_kinect(entry));
+      LIMN_TRY(CameraDescription device, is_projector ? read_ensemble_projector(entry) : read_kinect(entry));
       LIMN_TRY_STATUS(add_device(&device, is_projector, options, &file));
     }
   }
