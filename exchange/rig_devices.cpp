@@ -42,7 +42,7 @@ Status add_device(CameraDescription* device,
   return {};
 }
 
-void stand_in_first_camera(Rig* rig) {
+void move_world_to_first_camera(Rig* rig) {
   if (rig->cameras.empty()) return;
   const Pose old_world_from_first = rig->cameras[0].imager_from_world.inverse();
   for (auto* devices : {&rig->cameras, &rig->projectors})

@@ -11,6 +11,6 @@ namespace limn::exchange {
 Status add_device(CameraDescription* device, bool is_projector, const RigFileOptions& options, RigFile* file);
 
 /// Makes the coordinate frame of the first camera the world.
-void stand_in_first_camera(Rig* rig);
+void move_world_to_first_camera(Rig* rig);
 
 }  // namespace limn::exchange

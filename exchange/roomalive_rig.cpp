@@ -145,7 +145,7 @@ Result<RigFile> read_roomalive(const DataNode& root, const RigFileOptions& optio
       LIMN_TRY_STATUS(add_device(&device, is_projector, options, &file));
     }
   }
-  stand_in_first_camera(&file.rig);
+  move_world_to_first_camera(&file.rig);
   file.remarks.push_back(
       "the Kinect's colour images are mirrored; turn them over from left to right before Limn reads them");
   return file;

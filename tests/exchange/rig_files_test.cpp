@@ -3,7 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <opencv2/calib3d.hpp>
 
 #include "core/file.h"
