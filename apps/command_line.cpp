@@ -21,6 +21,7 @@
 #include "apps/doctor.h"
 #include "apps/export.h"
 #include "apps/import.h"
+#include "apps/import_rig.h"
 #include "apps/learn_body.h"
 #include "apps/live.h"
 #include "apps/markers.h"
@@ -699,19 +700,52 @@ void add_export(CLI::App& app, Run& run) {
   });
 }
 
+// The subcommand of `import`.
+CLI::App* add_import_rig(CLI::App* import, Run& run) {
+  auto* command = import->add_subcommand("rig", "Make a rig from the calibration of another program");
+  command->footer(
+      "Reads procam-calibration (calibration_result.xml), SLStudio (calibration.xml), procamcalib "
+      "(calibration.yml), RoomAlive\n"
+      "Toolkit (XML), OpenCV's stereo calibration (one file, or intrinsics and extrinsics) and MPCDI.\n"
+      "Example: limn import rig calibration_result.xml --units mm --projector 1024x768 --out rig\n"
+      "Example: limn import rig intrinsics.yml extrinsics.yml --units m --camera-size 640x480 --out rig");
+  auto options = std::make_shared<ImportRigOptions>();
+  command->add_option("files", options->files, "File of the other program, or two that belong together")
+      ->required()
+      ->expected(1, 2);
+  command->add_option("--out", options->out, "Rig folder to write")->required();
+  add_choice(command, "--units", &options->units, scene::k_length_units,
+             "Unit of the file's lengths, where it does not say: that of the board's squares");
+  command->add_option("--camera-size", options->camera_size,
+                      "Size of the camera's images in pixels, such as 1280x960, where the file does not say");
+  command->add_option(
+      "--projector", options->projector_size,
+      "Likewise of the projector. OpenCV's stereo calibration: the second device is a projector "
+      "of this size, not a camera");
+  command->add_flag("--json", options->json, "Print JSON instead of a line for each device");
+  command->callback([options, &run] { run = [options] { return report_result(run_import_rig(*options)); }; });
+  return command;
+}
+
 void add_import(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand(
       "import", "Show what an MPCDI file holds or what is wrong with it, and write its projectors as a rig");
   command->footer(
       "Reads archives of MPCDI 1 and 2, and XML without an archive as Christie's Mystique writes it (poses "
       "without maps).\n"
-      "Example: limn import theirs.mpcdi --out rig");
+      "Example: limn import theirs.mpcdi --out rig\n"
+      "Rigs of other programs: limn import rig --help");
   auto options = std::make_shared<ImportOptions>();
-  command->add_option("file", options->file, "Archive (.mpcdi) or XML (.mpcdi.xml)")->required();
+  command->add_option("file", options->file, "Archive (.mpcdi) or XML (.mpcdi.xml)");
   command->add_option("--out", options->out,
                       "Rig folder to write, in the file's own coordinate frame (profile sl)");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each region");
-  command->callback([options, &run] { run = [options] { return report_result(run_import(*options)); }; });
+  const CLI::App* rig = add_import_rig(command, run);
+  command->callback([options, rig, &run] {
+    if (rig->parsed()) return;  // its own callback has set `run`
+    if (options->file.empty()) throw CLI::RequiredError("file");
+    run = [options] { return report_result(run_import(*options)); };
+  });
 }
 
 void add_live(CLI::App& app, Run& run) {
@@ -924,7 +958,10 @@ int run_arguments(int argc, char** argv) {
     return app.exit(problem) == 0 ? 0 : 2;
   }
   try {
-    if (const Status files = check_files(*app.get_subcommands().front()); !files) return report_result(files);
+    for (const CLI::App* command = &app; !command->get_subcommands().empty();) {
+      command = command->get_subcommands().front();
+      if (const Status files = check_files(*command); !files) return report_result(files);
+    }
     return run();
   } catch (const std::filesystem::filesystem_error& problem) {
     return report_result(

@@ -176,7 +176,7 @@ Result<cv::Mat> read_png(const std::string& bytes, const cv::Size& wanted, const
 // Reads the XML document and, in an archive, the files that it names.
 class Reader {
  public:
-  explicit Reader(const fs::path& path) : where_(path.string()) {}
+  Reader(const fs::path& path, MpcdiParts parts) : where_(path.string()), parts_(parts) {}
 
   Result<Mpcdi> read();
 
@@ -198,6 +198,7 @@ class Reader {
                                        const MpcdiRegion& region);
 
   std::string where_;
+  MpcdiParts parts_;
   std::optional<ZipArchive> archive_;
   std::size_t unpacked_ = 0;
   std::map<std::string, double> units_;  // unit of each region's lengths in metres, if its warp names one
@@ -376,7 +377,7 @@ Status Reader::read_warp(const xml_node& node, const std::string& where, MpcdiRe
                  shortened(unit));
   if (const std::string origin = trimmed(child_of(node, "originOf3DData").text().get()); !origin.empty())
     region->origin = origin;
-  if (!has_path(node)) return {};
+  if (!has_path(node) || parts_ == MpcdiParts::poses) return {};
   if (has_points && !metres) out_.remarks.push_back(where + ": no unit; taken as metres");
   LIMN_TRY(region->warp, read_floats(node, where, *region));
   int known = 0;
@@ -403,6 +404,11 @@ Status Reader::read_fileset(const xml_node& node) {
   const std::string where = fmt::format("{}: fileset of region '{}'", where_, id);
   if (const xml_node warp = child_of(node, "geometryWarpFile"))
     LIMN_TRY_STATUS(read_warp(warp, where + ": geometryWarpFile", region));
+  if (parts_ == MpcdiParts::poses) {
+    if (has_path(child_of(node, "distortionMap")) && !region->lens)
+      out_.remarks.push_back(where + ": its distortionMap is ignored; the rig has the frustum's pinhole");
+    return {};
+  }
   if (const xml_node alpha = child_of(node, "alphaMap"); has_path(alpha)) {
     LIMN_TRY(region->alpha, read_blend_map(alpha, where + ": alphaMap", *region));
   }
@@ -458,9 +464,15 @@ Status Reader::check_regions() {
     if (out_.profile == MpcdiProfile::shader_lamps && !(region.frustum && region.frame))
       return error("{}: expected a frustum and a coordinateFrame in profile sl, found at most one of them.",
                    where);
-    if (out_.profile != MpcdiProfile::shader_lamps && region.warp.empty())
-      return error("{}: expected a fileset with a geometryWarpFile in profile {}, found none.", where,
-                   k_mpcdi_profiles.text(out_.profile));
+    const bool has_pose = region.frustum && region.frame;
+    if (out_.profile != MpcdiProfile::shader_lamps && region.warp.empty() && parts_ == MpcdiParts::all) {
+      if (!has_pose)
+        return error("{}: expected a fileset with a geometryWarpFile in profile {}, found none.", where,
+                     k_mpcdi_profiles.text(out_.profile));
+      out_.remarks.push_back(where + ": no geometryWarpFile; it has a pose alone");
+    }
+    if (parts_ == MpcdiParts::poses && has_pose && !units_.contains(region.id))
+      out_.remarks.push_back(where + ": no unit; its position is taken as metres");
     if (region.frustum && !region.has_other_lens)
       LIMN_TRY_STATUS(check_angles(*region.frustum, where + ": frustum"));
     if (const auto unit = units_.find(region.id); region.frame && unit != units_.end())
@@ -473,6 +485,6 @@ Status Reader::check_regions() {
 
 }  // namespace
 
-Result<Mpcdi> read_mpcdi(const fs::path& path) { return Reader(path).read(); }
+Result<Mpcdi> read_mpcdi(const fs::path& path, MpcdiParts parts) { return Reader(path, parts).read(); }
 
 }  // namespace limn::exchange

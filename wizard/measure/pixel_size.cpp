@@ -5,7 +5,7 @@
 
 namespace limn::wizard {
 
-Result<PixelSize> parse_pixel_size(const std::string& text) {
+Result<PixelSize> parse_pixel_size(const std::string& text, const std::string& option) {
   PixelSize size;
   const char* end = text.data() + text.size();
   const auto width = std::from_chars(text.data(), end, size.width);
@@ -13,7 +13,7 @@ Result<PixelSize> parse_pixel_size(const std::string& text) {
     const auto height = std::from_chars(width.ptr + 1, end, size.height);
     if (height.ec == std::errc() && height.ptr == end && size.width > 0 && size.height > 0) return size;
   }
-  return usage_error("--projector: expected a size such as 1280x800, found '{}'.", text);
+  return usage_error("{}: expected a size such as 1280x800, found '{}'.", option, text);
 }
 
 }  // namespace limn::wizard

@@ -11,7 +11,7 @@ struct PixelSize {
   int height = 0;
 };
 
-/// Parses a size such as "1280x800"; anything else is a usage error of --projector.
-Result<PixelSize> parse_pixel_size(const std::string& text);
+/// Parses a size such as "1280x800"; anything else is a usage error of `option`.
+Result<PixelSize> parse_pixel_size(const std::string& text, const std::string& option = "--projector");
 
 }  // namespace limn::wizard
