@@ -30,8 +30,7 @@ constexpr double k_min_broken_px = 24;
 constexpr std::size_t k_rough_points = 150, k_most_stride = 8;  // points of a boundary for the rough look
 constexpr std::size_t k_long_boundary = 2000;  // only parts of longer ones are looked at closely
 constexpr double k_rough_corner_px = 2.5;
-constexpr double k_rough_corner_share = 0.65;  // and this share of the stride, which cuts off corners
-constexpr double k_min_half_width = 1.5;       // px: writing and lines have less, and white margins have more
+constexpr double k_min_half_width = 1.5;  // px: writing and lines have less, and white margins have more
 constexpr double k_even_rms_px = 0.8;  // RMS distance of a side's cracks: something may break one with more
 constexpr double k_min_piece_share = 0.1;         // share of the side
 constexpr double k_min_pieces_share = 0.4;        // both together
@@ -151,8 +150,7 @@ void QuadFinder::find_broken_side(const Contours::Extent& contour,
   const Contours::Box box = contours_.box();
   if (std::min(box.width, box.height) < 0.5 * least) return;
   const std::size_t stride = std::clamp<std::size_t>(contour.count / k_rough_points, 2, k_most_stride);
-  const double tolerance_px = std::max(k_rough_corner_px, k_rough_corner_share * static_cast<double>(stride));
-  contours_.find_rough_corners(tolerance_px, contour.count, stride);
+  contours_.find_rough_corners(k_rough_corner_px, contour.count, stride);
   find_turns(least);
   if (turns_.empty()) return;
   if (contour.count <= k_long_boundary) {

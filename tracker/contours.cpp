@@ -337,13 +337,11 @@ void Contours::find_corners(double tolerance_px, std::size_t max_count, std::siz
 }
 
 void Contours::find_rough_corners(double tolerance_px, std::size_t max_count, std::size_t stride) {
-  start_at_far_point();
+  const std::size_t second = start_at_far_point() / stride;
   const std::size_t few = (count_ + stride - 1) / stride;
   few_points_.resize(few + 1 + k_together);
   for (std::size_t i = 0; i < few; ++i) few_points_[i] = points_[stride * i];
   std::fill(few_points_.begin() + static_cast<std::ptrdiff_t>(few), few_points_.end(), points_[0]);
-  // A corner of these points: one between them would make two corners out of one.
-  const std::size_t second = farthest_from(few_points_.data(), few, few_points_[0]);
   const Limits limits{static_cast<float>(2 * tolerance_px), max_count, 2};
   corners_.assign(1, 0);
   split(few_points_.data(), 0, second, limits, &corners_, &pending_);

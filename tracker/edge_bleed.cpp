@@ -78,13 +78,11 @@ BentTerms bent_terms(const Edges& edges, std::size_t i) {
   return terms;
 }
 
-// The mean of the bleed of flat paper and that of bent paper, by the evidence for bent paper, so that corners
-// do not jump as paper bends. `squares`: the sum of squared residuals of flat paper. `wider`: the measured
-// widening of white at each edge, NaN where the edge does not show.
-EdgeBleed bleed_of_bent_paper(const Edges& edges,
-                              std::span<const double> wider,
-                              const EdgeBleed& flat,
-                              double squares) {
+// The bleed of bent paper; nullopt where flat paper, whose squared residuals have the sum `squares`, explains
+// the edges as well. `wider`: the measured widening of white at each edge, NaN where the edge does not show.
+std::optional<EdgeBleed> bleed_of_bent_paper(const Edges& edges,
+                                             std::span<const double> wider,
+                                             double squares) {
   BentMatrix normal = BentMatrix::Zero();
   BentTerms right = BentTerms::Zero();
   double squares_of_all = 0;
@@ -97,17 +95,13 @@ EdgeBleed bleed_of_bent_paper(const Edges& edges,
     squares_of_all += wider[i] * wider[i];
     ++freedom;
   }
-  if (freedom < k_bent_terms) return flat;
+  if (freedom < k_bent_terms) return std::nullopt;
   const Eigen::LDLT<BentMatrix> solver(normal);
-  if (!(solver.vectorD().minCoeff() > 1e-3)) return flat;
+  if (!(solver.vectorD().minCoeff() > 1e-3)) return std::nullopt;
   const BentTerms terms = solver.solve(right);
-  const BentTerms first = solver.solve(BentTerms::Unit(0));
-  const double variance = std::max(1e-9, squares_of_all - right.dot(terms)) / freedom;
-  const double evidence = (squares - variance * freedom) / ((k_bent_terms - 1) * variance);
-  if (!(evidence > k_bent_evidence)) return flat;
-  const double share = 1 - k_bent_evidence / evidence;
-  return {(1 - share) * flat.px + share * terms[0],
-          (1 - share) * flat.variance + share * variance * first[0]};
+  const double variance = std::max(0.0, squares_of_all - right.dot(terms)) / freedom;
+  if (!(squares - variance * freedom > k_bent_evidence * (k_bent_terms - 1) * variance)) return std::nullopt;
+  return EdgeBleed{terms[0], variance * solver.solve(BentTerms::Unit(0))[0]};
 }
 
 }  // namespace
@@ -163,9 +157,9 @@ std::optional<EdgeBleed> find_edge_bleed(const cv::Mat& grey,
   }
   if (number < k_min_edges) return std::nullopt;
   const double squares = std::max(0.0, bb - ab * ab / aa);
-  const EdgeBleed flat{ab / aa, squares / (number - 1) / aa};
-  if (squares <= k_flat_residual_px * k_flat_residual_px * number) return flat;
-  return bleed_of_bent_paper(edges, wider, flat, squares);
+  if (squares > k_flat_residual_px * k_flat_residual_px * number)
+    if (const auto bent = bleed_of_bent_paper(edges, wider, squares)) return bent;
+  return EdgeBleed{ab / aa, squares / (number - 1) / aa};
 }
 
 std::optional<EdgeBleed> common_edge_bleed(std::span<const EdgeBleed> of_markers) {
