@@ -3,8 +3,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <functional>
-#include <optional>
-#include <vector>
 
 #include "tracker/contours.h"
 #include "tracker/threshold.h"
@@ -16,17 +14,12 @@ namespace limn::tracker {
 struct Quad {
   std::array<Eigen::Vector2d, 4> corners_px;
   double within_px = 3;  ///< how far off a corner may be
-  /// Something lies over the middle part of one side, or touches it.
-  bool side_is_broken = false;
 };
 
 struct CandidateOptions {
   /// Quadrilaterals whose longest side is shorter than this are ignored: a marker of 8 cells cannot be read
   /// below some 11 px. The height of a steep marker may be half of it.
   double min_side_px = 6;
-  /// Also finds quadrilaterals of which one side is broken: a spot of glare bites into it, or a finger or
-  /// something else that is dark joins it. Costs a tenth of the search.
-  bool broken_sides = false;
 };
 
 /// Finds the outlines of black regions that four straight lines describe. Holds its buffers between calls.
@@ -44,25 +37,12 @@ class QuadFinder {
   };
   static constexpr std::size_t k_max_corners = 10;
   Contours contours_;
-  std::vector<std::size_t> turns_;  // scratch: corners after which the outline turns around
-  std::vector<std::size_t> rough_corners_;
   std::array<Eigen::Vector2d, k_max_corners> corners_;                // corners of the outline
   std::array<std::array<Side, k_max_corners>, k_max_corners> sides_;  // from one corner to another
 
   const Side& side(std::size_t from, std::size_t to);
   bool turns_right(std::size_t a, std::size_t b, std::size_t c) const;
-  bool find_quad(const Contours::Extent& contour,
-                 double min_side_px,
-                 const std::function<void(const Quad&)>& on_quad);
   bool choose_quad(double min_side_px, Quad* quad);
-  bool is_uneven_ = false;  // whether a side of the last chosen quadrilateral is far from straight
-  void find_broken_side(const Contours::Extent& contour,
-                        double min_side_px,
-                        const std::function<void(const Quad&)>& on_quad);
-  void find_turns(double min_side_px);
-  void find_broken_sides(double min_side_px, const std::function<void(const Quad&)>& on_quad);
-  bool turns_around(std::size_t first, double min_side_px) const;
-  std::optional<Quad> quad_with_broken_side(std::size_t first, double min_side_px) const;
   bool fit_quad(const std::array<std::size_t, 4>& corners, double min_side_px, Quad* quad);
 };
 

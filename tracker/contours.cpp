@@ -313,8 +313,7 @@ Contours::Box Contours::box() const {
   return {0.5 * (bounds.high_x - bounds.low_x), 0.5 * (bounds.high_y - bounds.low_y)};
 }
 
-// Sets points_ so that the first one is far from another one, whose index is returned.
-std::size_t Contours::start_at_far_point() {
+void Contours::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
   // Repeat the points before the first corner behind the last point, and leave room for reading whole groups.
   std::vector<Packed>& trail = tracings_[last_].trail;
   const std::size_t most = begin_ + 2 * count_ + k_together;
@@ -323,38 +322,13 @@ std::size_t Contours::start_at_far_point() {
   const std::size_t first = farthest_from(&*begin, count_, *begin);
   std::copy_n(begin, first + 1, begin + static_cast<std::ptrdiff_t>(count_));
   points_ = std::span(trail).subspan(begin_ + first, count_ + 1);
-  return farthest_from(points_.data(), count_, points_[0]);
-}
-
-void Contours::find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run) {
-  const std::size_t second = start_at_far_point();
+  const std::size_t second = farthest_from(points_.data(), count_, points_[0]);
   corners_.clear();
   corners_.push_back(0);
   const Limits limits{static_cast<float>(2 * tolerance_px), max_count, std::max<std::size_t>(2, min_run)};
   split(points_.data(), 0, second, limits, &corners_, &pending_);
   corners_.push_back(second);
   split(points_.data(), second, count_, limits, &corners_, &pending_);
-}
-
-void Contours::find_rough_corners(double tolerance_px, std::size_t max_count, std::size_t stride) {
-  const std::size_t second = start_at_far_point() / stride;
-  const std::size_t few = (count_ + stride - 1) / stride;
-  few_points_.resize(few + 1 + k_together);
-  for (std::size_t i = 0; i < few; ++i) few_points_[i] = points_[stride * i];
-  std::fill(few_points_.begin() + static_cast<std::ptrdiff_t>(few), few_points_.end(), points_[0]);
-  const Limits limits{static_cast<float>(2 * tolerance_px), max_count, 2};
-  corners_.assign(1, 0);
-  split(few_points_.data(), 0, second, limits, &corners_, &pending_);
-  corners_.push_back(second);
-  split(few_points_.data(), second, few, limits, &corners_, &pending_);
-  for (std::size_t& corner : corners_) corner *= stride;
-}
-
-void Contours::find_corners_between(std::size_t from, std::size_t to, double tolerance_px) {
-  const Limits limits{static_cast<float>(2 * tolerance_px), to - from, 2};
-  corners_.assign(1, from);
-  split(points_.data(), from, to, limits, &corners_, &pending_);
-  corners_.push_back(to);
 }
 
 std::optional<Contours::Line> Contours::line(std::size_t from, std::size_t to, double max_rms_px) const {

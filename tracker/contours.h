@@ -52,13 +52,6 @@ class Contours {
   /// further.
   void find_corners(double tolerance_px, std::size_t max_count, std::size_t min_run = 2);
 
-  /// The same, with only every `stride`-th point: corners may be off by that many points along the boundary.
-  void find_rough_corners(double tolerance_px, std::size_t max_count, std::size_t stride);
-
-  /// Finds the corners between two points, `from` < `to` < size(), and at both; the points keep their
-  /// indices.
-  void find_corners_between(std::size_t from, std::size_t to, double tolerance_px);
-
   /// Indices of the corners' points, ascending; the first is 0. Point indices start at the first corner;
   /// point(size()) is the first point again, and line() takes indices of a second round.
   std::span<const std::size_t> corners() const { return corners_; }
@@ -115,7 +108,6 @@ class Contours {
   std::size_t count_ = 0;            // number of points
   std::span<const Packed> points_;   // from the first corner on; the first point is repeated at the end
   std::vector<std::size_t> corners_, pending_;
-  std::vector<Packed> few_points_;  // every stride-th point, and room for reading whole groups
 
   static Eigen::Vector2d at(Packed point) {
     return {0.5 * (point & 0xFFFF) - 0.5, 0.5 * (point >> 16) - 0.5};
@@ -126,7 +118,6 @@ class Contours {
   bool meets(const Way& way, End* moved, Packed* point, const End& end, const End& begin) const;
   void follow(Tracing* tracing) const;
   Tracing& follow_both();
-  std::size_t start_at_far_point();
 };
 
 }  // namespace limn::tracker

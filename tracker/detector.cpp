@@ -71,31 +71,6 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
   return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
-// Sides with a larger bow belong to paper that is bent: its cells do not lie where those of flat paper do,
-// and the fit of the whole pattern describes a smaller bow only.
-constexpr double k_flat_bow_share = 0.03, k_fit_bow_share = 0.06;
-// Shadows are searched for along straight sides. A shadow can bend a side, too, but leaves larger errors.
-constexpr double k_straight_bow_share = 0.012, k_clear_bow_px = 0.1;
-constexpr double k_surer = 0.5;          // ratio of variances
-constexpr double k_failed_variance = 6;  // factor, measured on cylinders
-
-double largest_variance(const RefinedQuad& quad) {
-  double largest = 0;
-  for (const Eigen::Matrix2d& covariance : quad.corner_covariance)
-    largest = std::max(largest, covariance.trace());
-  return largest;
-}
-
-// Adds to the covariance of a rough fit how far the corners lie from the outline's. Where no better fit was
-// found, the sides may not be straight.
-void add_doubt(const Quad& outline, bool has_failed, RefinedQuad* refined) {
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double apart = (refined->corners_px[i] - outline.corners_px[i]).squaredNorm();
-    if (has_failed) refined->corner_covariance[i] *= k_failed_variance;
-    refined->corner_covariance[i] += apart * Eigen::Matrix2d::Identity();
-  }
-}
-
 // A pattern is followed from image to image, and no shadow's edge is searched for while the light on both
 // sides of a marker's sides stays the same, for k_keep_images. The number doubles, up to k_keep_at_most, each
 // time the full reading confirms the result.
@@ -211,10 +186,6 @@ Detector::Detector(const Families& families, const DetectorOptions& options, Pol
       options_(options),
       is_inverted_(polarity == Polarity::light_on_dark) {
   options_.threads = std::max(1, options_.threads);
-  broken_sides_ =
-      options_.broken_markers && std::ranges::any_of(families_.codes(), [](const CodeFamily& family) {
-        return family.border_cells == 1 && family.grid.rings == 0 && !can_be_covered(family);
-      });
   options_.broken_markers &= std::any_of(families_.codes().begin(), families_.codes().end(), can_be_covered);
   workers_.assign(static_cast<std::size_t>(options_.threads),
                   {EdgeRefiner(options_.encoding, is_inverted_), {}});
@@ -238,31 +209,27 @@ void Detector::detect_more(const cv::Mat& grey,
   LIMN_CHECK(grey.empty() || grey.type() == CV_8UC1);
   if (grey.empty()) return;
   if (!families_.is_empty()) {
+    const bool broken = options_.broken_markers && reading == Reading::covered;
     WorkerTeam team(options_.threads);
-    team.work([&] { find_markers(grey, lens, reading, detections, team); });
+    team.work([&] { find_markers(grey, lens, broken, detections, team); });
   }
   if (!of_inverted_) return;
   cv::bitwise_not(grey, inverted_);
   of_inverted_->detect_more(inverted_, lens, detections, reading);
 }
 
-CandidateOptions Detector::candidate_options(Reading reading) const {
-  return {options_.min_side_px, broken_sides_ && reading == Reading::covered};
-}
-
 void Detector::find_markers(const cv::Mat& grey,
                             const Lens* lens,
-                            Reading reading,
+                            bool broken,
                             std::vector<Detection>* detections,
                             WorkerTeam& team) {
-  const bool broken = options_.broken_markers && reading == Reading::covered;
-  threshold_.apply(grey, {.min_contrast = options_.min_contrast, .above_noise = true}, corner_codes_, team);
+  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, team);
   quads_.clear();
   UnreadQuads open(quads_);
   team.parallel_for(team.size(), [&](int worker) {
     if (worker == 0) {
       const UnreadQuads::End end{open};
-      finder_.find(corner_codes_, candidate_options(reading), [&](const Quad& quad) {
+      finder_.find(corner_codes_, {options_.min_side_px}, [&](const Quad& quad) {
         if (!is_known(quad, *detections)) open.add(quad);
       });
     }
@@ -270,11 +237,7 @@ void Detector::find_markers(const cv::Mat& grey,
     read_quads(grey, lens, Reading::open, open, worker);
   });
   const auto bleed = add_read(std::nullopt, detections);
-  if (!broken) {
-    const bool seldom = broken_sides_ && reading == Reading::covered;
-    if (!seldom || (!detections->empty() && !threshold_.is_noisy())) return;
-    segment_finder_.find(grey, options_.min_contrast, segments_);
-  }
+  if (!broken) return;
   join_segments(grey, *detections, team);
   UnreadQuads covered(quads_);
   covered.end();
@@ -393,12 +356,12 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
     return std::nullopt;
   };
   WorkerTeam alone(1);
-  threshold_.apply(part, {.min_contrast = options_.min_contrast, .above_noise = true}, corner_codes_, alone);
+  threshold_.apply(part, {options_.min_contrast}, corner_codes_, alone);
   quads_.clear();
-  finder_.find(corner_codes_, candidate_options(Reading::covered),
+  finder_.find(corner_codes_, {options_.min_side_px},
                [&](const Quad& candidate) { quads_.push_back(candidate); });
   if (auto regular = read_quads(Reading::open)) return regular;
-  if (!options_.broken_markers && !broken_sides_) return std::nullopt;
+  if (!options_.broken_markers) return std::nullopt;
   segment_finder_.find(part, options_.min_contrast, segments_);
   join_segments(part, {}, alone);
   return read_quads(Reading::covered);
@@ -433,22 +396,8 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
                                              Worker& worker,
                                              const Detection* last) const {
   if (!may_be_marker(grey, quad, options_.min_contrast, thinnest_border_)) return std::nullopt;
-  const auto as = [&](Reading what) { return read_as(grey, quad, lens, what, worker, last); };
-  if (quad.side_is_broken) return as(Reading::broken_side);
-  if (reading != Reading::covered) return as(reading);
-  if (may_be_covered_code(grey, quad))
-    if (auto found = as(Reading::covered)) return found;
-  if (!broken_sides_ || !may_be_uncovered_code(grey, quad, families_)) return std::nullopt;
-  return as(Reading::joined);
-}
-
-std::optional<Detector::Read> Detector::read_as(const cv::Mat& grey,
-                                                const Quad& quad,
-                                                const Lens* lens,
-                                                Reading reading,
-                                                Worker& worker,
-                                                const Detection* last) const {
-  const bool covered = reading != Reading::open;
+  const bool covered = reading == Reading::covered;
+  if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
   const Sides sides = covered ? Sides::covered : Sides::whole;
   const auto refine = [&](const Quad& start, Effort effort) {
@@ -464,23 +413,9 @@ std::optional<Detector::Read> Detector::read_as(const cv::Mat& grey,
   auto refined = refine(start, Effort::full);
   auto identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
   if (!identity) {  // what lies around a small marker may bend its sides
-    if (!rough) rough = refine(quad, Effort::rough);
-    identity = rough ? identify(grey, *rough, families_, reading) : std::nullopt;
+    refined = rough ? rough : refine(quad, Effort::rough);
+    identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
-    // The cells of bent paper lie nearer to straight sides; its corners are where the bent sides meet.
-    const bool is_bent = refined && refined->bow_share > k_flat_bow_share &&
-                         !is_blurred(*refined, identity->cells, k_cell_sigmas);
-    if (!is_bent) {
-      const bool has_failed = !refined;
-      refined = rough;
-      if (shortest_side(quad) > k_rough_above_px) add_doubt(quad, has_failed, &*refined);
-    }
-  }
-  if (reading == Reading::covered) {  // perhaps nothing is covered, and the paper is bent
-    const auto whole = worker.refiner.refine(grey, start, min_contrast, lens, Effort::full, Sides::whole);
-    if (whole && whole->bow_share > k_flat_bow_share &&
-        largest_variance(*whole) < k_surer * largest_variance(*refined))
-      refined = whole;
   }
   const bool is_followed = last && last->marker == identity->marker;
   Read read;
@@ -492,9 +427,7 @@ std::optional<Detector::Read> Detector::read_as(const cv::Mat& grey,
     UnshadowedSides sides = unshadowed_sides(*identity, *refined);
     sides.kept_for = is_light_known ? kept_longer(detection.unshadowed->kept_for) : k_keep_images;
     detection.unshadowed.reset();
-    const bool is_bent = refined->bow_share > k_straight_bow_share &&
-                         largest_variance(*refined) < 2 * k_clear_bow_px * k_clear_bow_px;
-    if (!is_bent && !is_inverted_)  // in inverted images shadows are no factors of the light
+    if (!is_inverted_)  // there shadows are no factors of the light
       shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
     if (shadows == ShadowEdges::none) detection.unshadowed = sides;
   }
@@ -502,8 +435,7 @@ std::optional<Detector::Read> Detector::read_as(const cv::Mat& grey,
     const auto known = is_followed ? aged(last->by_pattern) : std::nullopt;
     if (!refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas))
       detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, known, &*refined);
-    if (!detection.by_pattern && !covered && refined->bow_share < k_flat_bow_share &&
-        !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
+    if (!detection.by_pattern && !covered && !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
         std::ranges::all_of(refined->corner_visible, std::identity()))
       read.bleed = find_edge_bleed(grey, worker.refiner.light(), refined->corners_px, identity->cells);
   }
@@ -543,7 +475,6 @@ std::optional<PatternAppearance> Detector::settle_overlapping_edges(
     }
   }
   const bool may_fit = options_.pattern_fits && identity.cells.count > 0 &&
-                       refined->bow_share < k_fit_bow_share &&
                        shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
     if (auto fitted = fit_pattern(grey, light, *refined, identity.cells, lens, &worker.fit)) {

@@ -32,9 +32,7 @@ struct DetectorOptions {
   /// softer their edges are; the correction by the edges of their cells removes most of that (edge_bleed.h).
   Encoding encoding = Encoding::linear;
   /// Also joins straight edges to quadrilaterals, to find markers that are broken up by fingers, bites or
-  /// slatted shadows. Costs about half as much again as the rest. Where no family can_be_covered(), it is
-  /// done only in images that are noisy or show no other marker. Codes that cannot be covered are also read
-  /// from quadrilaterals with one broken side; every cell must be right.
+  /// slatted shadows. Costs about half as much again as the rest. Skipped when no family can_be_covered().
   bool broken_markers = true;
   /// Also fits the whole pattern of markers whose edges blur into each other, which is common for small ones:
   /// their corners become up to ten times better. A fit costs several times what reading a marker costs.
@@ -94,7 +92,6 @@ class Detector {
   // The families whose squares are light are found in the inverted image; null when there are none.
   std::unique_ptr<Detector> of_inverted_;
   cv::Mat inverted_;
-  bool broken_sides_ = false;  // whether a family's codes are read where one side is broken
   Threshold threshold_;
   CornerCodes corner_codes_;
   QuadFinder finder_;
@@ -118,7 +115,6 @@ class Detector {
   std::vector<EdgeBleed> retreats_;  // edge bleed of the markers that were read
 
   class UnreadQuads;
-  CandidateOptions candidate_options(Reading reading) const;
   std::optional<Read> follow_by_pattern(const cv::Mat& grey, const Lens* lens, const Detection& last);
   std::optional<Read> found_again(const cv::Mat& grey, const Lens* lens, const Detection& last);
   void follow_own(const cv::Mat& grey,
@@ -127,7 +123,7 @@ class Detector {
                   std::vector<Detection>* detections);
   void find_markers(const cv::Mat& grey,
                     const Lens* lens,
-                    Reading reading,
+                    bool broken,
                     std::vector<Detection>* detections,
                     WorkerTeam& team);
   void read_quads(const cv::Mat& grey, const Lens* lens, Reading reading, UnreadQuads& unread, int worker);
@@ -140,12 +136,6 @@ class Detector {
                            Reading reading,
                            Worker& worker,
                            const Detection* last = nullptr) const;
-  std::optional<Read> read_as(const cv::Mat& grey,
-                              const Quad& quad,
-                              const Lens* lens,
-                              Reading reading,
-                              Worker& worker,
-                              const Detection* last) const;
   std::optional<PatternAppearance> settle_overlapping_edges(const cv::Mat& grey,
                                                             const Lens* lens,
                                                             const Identity& identity,

@@ -29,11 +29,7 @@ bool has_dark_border(const cv::Mat& grey, const RefinedQuad& quad, double border
 
 /// What may be assumed when a quad is read.
 enum class Reading {
-  open,  ///< all cells are visible, in uniform light
-  /// Something may lie over a part of the border along one side. Only codes that are not read when covered,
-  /// with every cell right and light paper around.
-  broken_side,
-  joined,  ///< the same for quads that were joined from edges: the whole border is dark
+  open,    ///< all cells are visible, in uniform light
   covered  ///< cells may be hidden and shadows may cross: codes only, hidden bits are counted as hidden
 };
 

@@ -2,11 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cstdint>
 #include <span>
 
-#include "tracker/identify.h"
 #include "tracker/quad_reader.h"
 #include "tracker/quad_sampler.h"
 #include "tracker/simd.h"
@@ -124,52 +122,6 @@ bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
       changes += i + k_cells < inside.size() && is_light != (inside[i + k_cells] > limit);
     }
     return changes >= k_min_changes;
-  });
-}
-
-bool may_be_uncovered_code(const cv::Mat& grey, const Quad& quad, const Families& families) {
-  constexpr std::size_t k_most_side = 8;  // cells along a side, border included
-  constexpr int k_most_wrong = 2, k_most_light_border = 1;
-  int last_cells = 0;
-  std::uint64_t code = 0;
-  bool has_border = false;
-  return std::ranges::any_of(families.codes(), [&](const CodeFamily& family) {
-    const auto side = static_cast<std::size_t>(family.cells) + 2;
-    if (can_be_covered(family) || family.border_cells != 1 || family.grid.rings > 0 || side > k_most_side)
-      return false;
-    if (family.cells != last_cells) {
-      last_cells = family.cells;
-      std::array<std::array<float, k_most_side * k_most_side>, 2> at;
-      for (std::size_t i = 0; i < side * side; ++i) {
-        at[0][i] = (static_cast<float>(i % side) + 0.5F) / static_cast<float>(side);
-        at[1][i] = (static_cast<float>(i / side) + 0.5F) / static_cast<float>(side);
-      }
-      std::array<std::uint8_t, k_most_side * k_most_side> levels;
-      QuadSampler(grey, quad.corners_px)
-          .nearest(std::span(at[0]).first(side * side), std::span(at[1]).first(side * side), levels.data());
-      std::array<std::uint8_t, 4 * k_most_side> border;
-      int border_cells = 0;
-      std::uint8_t lightest = 0;
-      const auto is_border = [&](std::size_t i) {
-        return i < side || i >= side * (side - 1) || i % side == 0 || i % side == side - 1;
-      };
-      for (std::size_t i = 0; i < side * side; ++i)
-        if (is_border(i))
-          border[static_cast<std::size_t>(border_cells++)] = levels[i];
-        else
-          lightest = std::max(lightest, levels[i]);
-      const int dark = level_of_rank(border.data(), border_cells, border_cells / 2);
-      const double middle = dark + k_middle * (lightest - dark);
-      has_border = std::count_if(border.begin(), border.begin() + border_cells,
-                                 [&](int level) { return level > middle; }) <= k_most_light_border;
-      code = 0;
-      for (std::size_t i = 0; i < side * side; ++i)
-        if (!is_border(i)) code = (code << 1) | std::uint64_t{levels[i] > middle};
-    }
-    return has_border && std::ranges::any_of(family.codes, [&](const std::array<std::uint64_t, 4>& turns) {
-             return std::ranges::any_of(
-                 turns, [&](std::uint64_t turn) { return std::popcount(turn ^ code) <= k_most_wrong; });
-           });
   });
 }
 

@@ -3,7 +3,6 @@
 #include <opencv2/core/mat.hpp>
 
 #include "tracker/candidates.h"
-#include "tracker/family.h"
 
 namespace limn::tracker {
 
@@ -17,9 +16,5 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast, d
 /// Whether it could be a code that is partly hidden: most of the border is dark, and the cells change as
 /// often as a code's do. Rejects nine in ten quadrilaterals of clutter.
 bool may_be_covered_code(const cv::Mat& grey, const Quad& quad);
-
-/// Whether the nearest pixels show a code that is not read when covered, but for two cells, and a border that
-/// is dark. Costs as much as may_be_covered_code.
-bool may_be_uncovered_code(const cv::Mat& grey, const Quad& quad, const Families& families);
 
 }  // namespace limn::tracker

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cmath>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
@@ -44,8 +43,6 @@ struct RefinedQuad {
   bool separate = true;
   /// Whether both sides are visible next to the corner.
   std::array<bool, 4> corner_visible{};
-  /// Largest bow of a side, as a share of half its length; 0 for flat paper.
-  double bow_share = 0;
 };
 
 /// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw image and
@@ -94,18 +91,14 @@ class EdgeRefiner {
   std::vector<float> deviations_;  // scratch memory of the robust scale
 
  public:
-  /// The line of a side, v = offset + slope * d + curvature * d^2 + third * d^3 + fourth * d^4,
-  /// d = u - u_middle, in the raw image without the lens's curvature. Curvature comes from bent paper or from
-  /// a lens that is not given; the higher terms come from paper that is bent strongly. They are 0 where the
-  /// crossings do not show them and grow steadily with the evidence.
+  /// The line of a side, v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw image without
+  /// the lens's curvature. Curvature comes from bent paper or from a lens that is not given. It is 0 where
+  /// the crossings do not show it and grows steadily with the evidence.
   struct EdgeLine {
-    using Terms = Eigen::Matrix<double, 5, 1>;
     bool flat = true;  ///< true: u is x and v is y; false: u is y and v is x
     double u_middle = 0;
-    double half = 0;  ///< half the length of the crossings, along u
-    double offset = 0, slope = 0, curvature = 0, third = 0, fourth = 0;
-    /// Covariance of the five terms, offset first.
-    Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
+    double offset = 0, slope = 0, curvature = 0;
+    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< covariance of (offset, slope, curvature)
     double correlation = 1;  ///< the variance over that for independent crossings
     double outside_level = 0, inside_level = 0;
     double blur_px = 0;
@@ -115,20 +108,13 @@ class EdgeRefiner {
 
     double at(double u) const {
       const double d = u - u_middle;
-      return offset + d * (slope + d * (curvature + d * (third + d * fourth)));
+      return offset + d * (slope + d * curvature);
     }
-    double slope_at(double u) const {
-      const double d = u - u_middle;
-      return slope + d * (2 * curvature + d * (3 * third + d * 4 * fourth));
-    }
-    Terms terms() const { return {offset, slope, curvature, third, fourth}; }
-    /// The bow of the quadratic term between the ends and the middle, px.
-    double bow_px() const { return std::abs(curvature) * half * half; }
+    double slope_at(double u) const { return slope + 2 * curvature * (u - u_middle); }
     /// Variance of at(u).
     double variance(double u) const {
       const double d = u - u_middle;
-      Terms row;
-      row << 1, d, d * d, d * d * d, d * d * d * d;
+      const Eigen::Vector3d row(1, d, d * d);
       return row.dot(covariance * row);
     }
   };
@@ -145,11 +131,10 @@ class EdgeRefiner {
                 const EdgeLine* before,
                 EdgeLine* line);
   void settle_shares(Effort effort);
-  bool fit_line(Effort effort, Sides sides, bool is_near, EdgeLine* line, double* variance);
+  bool fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance);
   void find_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
   double correlation_along(const EdgeLine& line, double variance) const;
   double fit_terms(int terms, bool from_line, EdgeLine* line);
-  bool fit_curve(double* variance, EdgeLine* line);
   void find_consensus(EdgeLine* line);
 };
 
