@@ -108,7 +108,7 @@ constexpr double k_unknown_correlation = 0.75;
 
 // By how much better (in nats) than the reading a code in another grid must explain the square to be as
 // likely: its cells are free, so blur and noise fit them a little better than any marker's.
-constexpr double k_free_cells = 10;
+constexpr double k_free_cells = 25;
 constexpr double k_free_barcode = 3;  // the same for the few cells of a barcode
 // A reading that explains the square as well as this is not one in a wrong grid.
 constexpr double k_clear_correlation = 0.92;
