@@ -58,10 +58,12 @@ class CommandLine : public testing::Test {
                  "marker_from_part": {"rotation_wxyz": [1, 0, 0, 0], "translation_m": [0, 0, 0]},
                  "variants": [{"name": "a", "mesh": "tri.obj", "units": "m"}]}]})");
   }
-  void expect_scene_error(const nlohmann::json& spoiled, const std::vector<std::string>& parts) {
+  void expect_scene_error(const nlohmann::json& spoiled,
+                          const std::vector<std::string>& parts,
+                          const std::string& poses = "{}") {
     write_rig();
     write("scene/scene.json", spoiled.dump());
-    write("poses.json", "{}");
+    write("poses.json", poses);
     expect({"render", "--rig", path("rig"), "--scene", path("scene"), "--poses", path("poses.json"), "--out",
             path("out")},
            1, parts);
@@ -208,9 +210,11 @@ TEST_F(CommandLine, SpoiledMeshesAreNamed) {
     write("scene/bad.obj", content);
     return with_mesh;
   };
-  expect_scene_error(spoiled("v 0 0 0\nv 1 0 0\nv 0 1 0\n"), {"bad.obj", "triangles"});
-  expect_scene_error(spoiled("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), {"bad.obj"});
-  expect_scene_error(spoiled(""), {"bad.obj"});
+  const std::string shown = R"({"slots": {"mirror": {"world_from_part":
+      {"rotation_wxyz": [1, 0, 0, 0], "translation_m": [0, 0, 1]}, "variant": "a"}}})";
+  expect_scene_error(spoiled("v 0 0 0\nv 1 0 0\nv 0 1 0\n"), {"bad.obj", "triangles"}, shown);
+  expect_scene_error(spoiled("v nan 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), {"bad.obj"}, shown);
+  expect_scene_error(spoiled(""), {"bad.obj"}, shown);
 }
 
 TEST_F(CommandLine, UnknownSlotsAndDevicesAreNamed) {
