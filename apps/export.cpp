@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "core/json_text.h"
@@ -46,10 +47,8 @@ void print(const ordered_json& report) {
   }
 }
 
-// The maps of all projectors, drawn without a display.
+// The maps of all projectors, drawn with the current OpenGL context.
 Status add_maps(const exchange::ExportOptions& options, exchange::ExportJob* job) {
-  LIMN_TRY(const device::GlContext context, device::GlContext::create());
-  log_info("export: {}", context.description());
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(job->scene, job->rig));
   const scene::PosedScene bare{job->posed.world_from_prototype, {}};
   int lit = 0;
@@ -71,7 +70,12 @@ Status add_maps(const exchange::ExportOptions& options, exchange::ExportJob* job
 Status run_export(const exchange::ExportOptions& options, bool is_json) {
   LIMN_TRY_STATUS(exchange::check_export(options));
   LIMN_TRY(exchange::ExportJob job, exchange::load_export_job(options));
-  if (exchange::needs_prototype(options)) LIMN_TRY_STATUS(add_maps(options, &job));
+  std::optional<device::GlContext> context;  // exporters of looks draw, too
+  if (exchange::needs_prototype(options)) {
+    LIMN_TRY(context, device::GlContext::create());
+    log_info("export: {}", context->description());
+    LIMN_TRY_STATUS(add_maps(options, &job));
+  }
   for (const exchange::Exporter& exporter : exchange::exporters())
     if (exporter.is_asked_for(options)) LIMN_TRY_STATUS(exporter.write(job, options));
   const ordered_json report = report_of(job);
