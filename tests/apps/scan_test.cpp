@@ -310,8 +310,10 @@ TEST(Align, CallsWrongOptionsWrongUsage) {
   command.out = test::test_folder() / "out";
   EXPECT_TRUE(run_align(command).error().wrong_usage);  // neither a scan nor markers
   command.scan = "scan.ply";
+  command.mesh = "door.obj";  // this format states no unit
   command.units.reset();
   EXPECT_TRUE(run_align(command).error().wrong_usage);
+  command.mesh = k_door;
   command.units = scene::LengthUnit::metre;
   command.start = "a.json";
   command.points = "b.json";
