@@ -103,6 +103,18 @@ std::string mesh_formats() {
   return text;
 }
 
+void move_vertex(const Eigen::Matrix4d& m, std::size_t vertex, MeshPiece* piece) {
+  const Eigen::Matrix3d turn = m.topLeftCorner<3, 3>();
+  piece->positions[vertex] =
+      (turn * piece->positions[vertex].cast<double>() + m.topRightCorner<3, 1>()).cast<float>();
+  if (!piece->normals.empty())
+    piece->normals[vertex] =
+        (turn.inverse().transpose() * piece->normals[vertex].cast<double>()).normalized().cast<float>();
+  if (!piece->tangents.empty())
+    piece->tangents[vertex].head<3>() =
+        (turn * piece->tangents[vertex].head<3>().cast<double>()).normalized().cast<float>();
+}
+
 Result<MeshContent> read_mesh_content(const fs::path& path) {
   const MeshFormat* format = format_of(path);
   if (format) return format->read(path);

@@ -25,6 +25,9 @@ struct MeshPiece {
   std::size_t material = 0;  ///< Index into MeshContent::materials.
 };
 
+/// Moves a vertex with its normal and tangent by an affine matrix, as a skin's joints do.
+void move_vertex(const Eigen::Matrix4d& m, std::size_t vertex, MeshPiece* piece);
+
 /// How a material's textures are mapped: which set of the file's texture coordinates they use, and how those
 /// are transformed (glTF's KHR_texture_transform). v counts up.
 struct TexturePlace {

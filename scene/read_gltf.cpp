@@ -397,18 +397,6 @@ class GltfReader {
     return {};
   }
 
-  static void move_vertex(const Eigen::Matrix4d& m, std::size_t i, MeshPiece* piece) {
-    const Eigen::Matrix3d turn = m.topLeftCorner<3, 3>();
-    piece->positions[i] =
-        (turn * piece->positions[i].cast<double>() + m.topRightCorner<3, 1>()).cast<float>();
-    if (!piece->normals.empty())
-      piece->normals[i] =
-          (turn.inverse().transpose() * piece->normals[i].cast<double>()).normalized().cast<float>();
-    if (!piece->tangents.empty())
-      piece->tangents[i].head<3>() =
-          (turn * piece->tangents[i].head<3>().cast<double>()).normalized().cast<float>();
-  }
-
   GltfFile& file_;
   const json& root_;
   MeshContent content_;

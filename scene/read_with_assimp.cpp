@@ -165,12 +165,7 @@ class AssimpReader {
     }
     for (std::size_t i = 0; i < sums.size() && mesh.mNumBones > 0; ++i) {
       const Eigen::Matrix4d m = totals[i] > 0 ? Eigen::Matrix4d(sums[i] / totals[i]) : file_from_node;
-      const Eigen::Matrix3d turn = m.topLeftCorner<3, 3>();
-      piece->positions[i] =
-          (turn * piece->positions[i].cast<double>() + m.topRightCorner<3, 1>()).cast<float>();
-      if (!piece->normals.empty())
-        piece->normals[i] =
-            (turn.inverse().transpose() * piece->normals[i].cast<double>()).normalized().cast<float>();
+      move_vertex(m, i, piece);
     }
     return mesh.mNumBones > 0;
   }

@@ -213,14 +213,7 @@ void read_code(const std::vector<CodeFamily>& families,
 bool is_border_dark(const QuadReader& reader, double border) {
   constexpr int k_places = 24;  // places along a side
   Places places;
-  for (const double inset : {0.32 * border, 0.76 * border})
-    for (int i = 0; i < k_places; ++i) {
-      const double along = inset + (1 - 2 * inset) * i / k_places;
-      places.add(along, inset);
-      places.add(1 - inset, along);
-      places.add(1 - along, 1 - inset);
-      places.add(inset, 1 - along);
-    }
+  for (const double inset : {0.32 * border, 0.76 * border}) places.add_ring(inset, k_places);
   return reader.light_places(places) <= k_barcode_border_errors * 8 * k_places;
 }
 
@@ -230,13 +223,7 @@ bool has_wide_border(const QuadReader& reader) {
   constexpr int k_places = 6;  // places along a side
   constexpr double k_inset = 0.15;
   Places places;
-  for (int i = 0; i < k_places; ++i) {
-    const double along = k_inset + (1 - 2 * k_inset) * i / k_places;
-    places.add(along, k_inset);
-    places.add(1 - k_inset, along);
-    places.add(1 - along, 1 - k_inset);
-    places.add(k_inset, 1 - along);
-  }
+  places.add_ring(k_inset, k_places);
   return reader.light_places(places) <= 2;
 }
 

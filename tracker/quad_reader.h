@@ -37,6 +37,16 @@ struct Places {
     x[count] = static_cast<float>(at_x);
     y[count++] = static_cast<float>(at_y);
   }
+  // Adds `count` places along each side of the square that lies `inset` inside the unit square.
+  void add_ring(double inset, int count) {
+    for (int i = 0; i < count; ++i) {
+      const double along = inset + (1 - 2 * inset) * i / count;
+      add(along, inset);
+      add(1 - inset, along);
+      add(1 - along, 1 - inset);
+      add(inset, 1 - along);
+    }
+  }
   // Adds one or five places in the middle half of the cell about (x, y), of a grid with `cells` a side.
   void add_cell(double at_x, double at_y, double cells, bool several) {
     add(at_x, at_y);
