@@ -69,7 +69,7 @@ Eigen::Matrix4d matrix_of(const json& node) {
       m(i % 4, i / 4) = found->at(static_cast<std::size_t>(i)).get<double>();
     return m;
   }
-  const auto read = [&](const char* key, std::vector<double> otherwise) {
+  const auto read = [&](const char* key, const std::vector<double>& otherwise) {
     std::vector<double> values = node.value(key, otherwise);
     values.resize(std::max(values.size(), otherwise.size()), 0);
     return values;

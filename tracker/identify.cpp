@@ -54,7 +54,7 @@ Bits bits_of(const Grid& values, const CodeGrid& grid) {
   std::size_t at = 0;
   for (int row = 0; row < grid.width; ++row)
     for (int column = 0; column < grid.width; ++column, ++at) {
-      const int cell = grid.cells[at];
+      const auto cell = static_cast<int>(grid.cells[at]);
       const double value = values[at];
       if (cell == CodeGrid::k_unused) continue;
       if (cell < 0) {
@@ -99,7 +99,7 @@ SeenCells cells_of(const CodeFamily& family, std::uint64_t code) {
   std::size_t at = 0;
   for (int row = 0; row < cells.count; ++row)
     for (int column = 0; column < cells.count; ++column) {
-      const int cell = grid.at(row + grid.rings, column + grid.rings);
+      const auto cell = static_cast<int>(grid.at(row + grid.rings, column + grid.rings));
       cells.white[at++] = cell >= 0 ? (code >> cell) & 1 : cell != CodeGrid::k_dark;
     }
   return cells;
@@ -399,8 +399,7 @@ std::optional<Identity> identify(const cv::Mat& grey,
   const double beyond = families.reach();
   if (reading == Reading::covered)
     return identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty);
-  if (const auto found =
-          identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty))
+  if (auto found = identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty))
     return found;
   // Something brighter than the paper may lie behind one side: use the level of the second darkest side for
   // all.

@@ -49,8 +49,8 @@ struct Pattern {
 
  private:
   float value_of(std::int8_t cell) const {
-    if (cell >= 0) return (code >> cell) & 1 ? 1 : -1;
-    return cell == CodeGrid::k_dark ? -1 : cell == CodeGrid::k_light ? 1 : 0;
+    if (cell >= 0) return (code >> cell) & 1 ? 1.0F : -1.0F;
+    return cell == CodeGrid::k_dark ? -1.0F : cell == CodeGrid::k_light ? 1.0F : 0.0F;
   }
 };
 
