@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/imager.h"
 #include "core/json_text.h"
 #include "core/names.h"
 
