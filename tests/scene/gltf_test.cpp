@@ -145,9 +145,9 @@ void add_texture(Gltf* file, const json& image, const json& texture = {{"source"
   file->primitive()["attributes"]["TEXCOORD_0"] =
       file->accessor(std::vector<float>{0, 1, 1, 1, 1, 0, 0, 0}, 5126, "VEC2", 4);
   file->primitive()["material"] = 0;
-  file->root["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
-  file->root["textures"] = {texture};
-  file->root["images"] = {image};
+  file->root["materials"] = json::array({{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}});
+  file->root["textures"] = json::array({texture});
+  file->root["images"] = json::array({image});
 }
 
 cv::Vec3b texel(const Mesh& mesh) {
@@ -326,17 +326,18 @@ TEST(GltfMesh, SpecularGlossinessBecomesTheBaseColour) {
   Gltf file = plate();
   file.primitive()["material"] = 0;
   file.root["extensionsUsed"] = {"KHR_materials_pbrSpecularGlossiness"};
-  file.root["materials"] = {{{"extensions",
-                              {{"KHR_materials_pbrSpecularGlossiness",
-                                {{"diffuseFactor", {0.8, 0.1, 0.2, 1}}, {"glossinessFactor", 0.25}}}}}}};
+  file.root["materials"] =
+      json::array({{{"extensions",
+                     {{"KHR_materials_pbrSpecularGlossiness",
+                       {{"diffuseFactor", {0.8, 0.1, 0.2, 1}}, {"glossinessFactor", 0.25}}}}}}});
   const Material material = loaded(file.glb()).materials.at(0);
   EXPECT_TRUE(test::near(material.base_colour.cast<double>(), Vector3d(0.8, 0.1, 0.2), 1e-6));
   EXPECT_EQ(material.metallic, 0);
   EXPECT_NEAR(material.roughness, 0.75, 1e-6);
   add_texture(&file, {{"uri", "red.png"}});
   written("red.png", png({0, 0, 200}));
-  file.root["materials"] = {
-      {{"extensions", {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseTexture", {{"index", 0}}}}}}}}};
+  file.root["materials"] = json::array(
+      {{{"extensions", {{"KHR_materials_pbrSpecularGlossiness", {{"diffuseTexture", {{"index", 0}}}}}}}}});
   EXPECT_EQ(texel(loaded(file.glb())), cv::Vec3b(0, 0, 200));
 }
 
@@ -378,7 +379,8 @@ TEST(GltfMesh, ExtensionsThatAreNotReadAreNamed) {
   EXPECT_TRUE(contains(error_of(file.glb()), "found ACME_secret_geometry. Switch ACME_secret_geometry off"));
   Gltf coated = plate();
   coated.primitive()["material"] = 0;
-  coated.root["materials"] = {{{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}}}};
+  coated.root["materials"] =
+      json::array({{{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}}}});
   loaded(coated.glb());
   EXPECT_TRUE(contains(g_messages, "its materials are shown without KHR_materials_clearcoat"));
 }
