@@ -71,6 +71,29 @@ bool is_blurred(const RefinedQuad& quad, const SeenCells& cells, double cell_sig
   return shortest_side(Quad{quad.corners_px}) < cell_sigmas * blur_of(quad) * cells.count;
 }
 
+// Sides with a larger bow belong to paper that is bent: its cells do not lie where those of flat paper do,
+// and the fit of the whole pattern describes a smaller bow only.
+constexpr double k_flat_bow_share = 0.03, k_fit_bow_share = 0.06;
+constexpr double k_surer = 0.5;          // ratio of variances
+constexpr double k_failed_variance = 6;  // factor, measured on cylinders
+
+double largest_variance(const RefinedQuad& quad) {
+  double largest = 0;
+  for (const Eigen::Matrix2d& covariance : quad.corner_covariance)
+    largest = std::max(largest, covariance.trace());
+  return largest;
+}
+
+// Adds to the covariance of a rough fit how far the corners lie from the outline's. Where no better fit was
+// found, the sides may not be straight.
+void add_doubt(const Quad& outline, bool has_failed, RefinedQuad* refined) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double apart = (refined->corners_px[i] - outline.corners_px[i]).squaredNorm();
+    if (has_failed) refined->corner_covariance[i] *= k_failed_variance;
+    refined->corner_covariance[i] += apart * Eigen::Matrix2d::Identity();
+  }
+}
+
 // A pattern is followed from image to image, and no shadow's edge is searched for while the light on both
 // sides of a marker's sides stays the same, for k_keep_images. The number doubles, up to k_keep_at_most, each
 // time the full reading confirms the result.
@@ -186,7 +209,8 @@ Detector::Detector(const Families& families, const DetectorOptions& options, Pol
       options_(options),
       is_inverted_(polarity == Polarity::light_on_dark) {
   options_.threads = std::max(1, options_.threads);
-  options_.broken_markers &= std::any_of(families_.codes().begin(), families_.codes().end(), can_be_covered);
+  has_uncovered_codes_ = std::ranges::any_of(families_.codes(), can_have_broken_side);
+  options_.broken_markers &= has_uncovered_codes_ || std::ranges::any_of(families_.codes(), can_be_covered);
   workers_.assign(static_cast<std::size_t>(options_.threads),
                   {EdgeRefiner(options_.encoding, is_inverted_), {}});
 }
@@ -223,7 +247,7 @@ void Detector::find_markers(const cv::Mat& grey,
                             bool broken,
                             std::vector<Detection>* detections,
                             WorkerTeam& team) {
-  threshold_.apply(grey, {options_.min_contrast}, corner_codes_, team);
+  threshold_.apply(grey, {.min_contrast = options_.min_contrast, .above_noise = true}, corner_codes_, team);
   quads_.clear();
   UnreadQuads open(quads_);
   team.parallel_for(team.size(), [&](int worker) {
@@ -356,7 +380,7 @@ std::optional<Detector::Read> Detector::found_again(const cv::Mat& grey,
     return std::nullopt;
   };
   WorkerTeam alone(1);
-  threshold_.apply(part, {options_.min_contrast}, corner_codes_, alone);
+  threshold_.apply(part, {.min_contrast = options_.min_contrast, .above_noise = true}, corner_codes_, alone);
   quads_.clear();
   finder_.find(corner_codes_, {options_.min_side_px},
                [&](const Quad& candidate) { quads_.push_back(candidate); });
@@ -396,8 +420,21 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
                                              Worker& worker,
                                              const Detection* last) const {
   if (!may_be_marker(grey, quad, options_.min_contrast, thinnest_border_)) return std::nullopt;
-  const bool covered = reading == Reading::covered;
-  if (covered && !may_be_covered_code(grey, quad)) return std::nullopt;
+  const auto as = [&](Reading what) { return read_as(grey, quad, lens, what, worker, last); };
+  if (reading != Reading::covered) return as(reading);
+  if (may_be_covered_code(grey, quad))
+    if (auto found = as(Reading::covered)) return found;
+  if (!has_uncovered_codes_ || !may_be_code_with_broken_side(grey, quad, families_)) return std::nullopt;
+  return as(Reading::broken_side);
+}
+
+std::optional<Detector::Read> Detector::read_as(const cv::Mat& grey,
+                                                const Quad& quad,
+                                                const Lens* lens,
+                                                Reading reading,
+                                                Worker& worker,
+                                                const Detection* last) const {
+  const bool covered = reading != Reading::open;
   const double min_contrast = k_refined_contrast * options_.min_contrast;
   const Sides sides = covered ? Sides::covered : Sides::whole;
   const auto refine = [&](const Quad& start, Effort effort) {
@@ -413,9 +450,23 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
   auto refined = refine(start, Effort::full);
   auto identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
   if (!identity) {  // what lies around a small marker may bend its sides
-    refined = rough ? rough : refine(quad, Effort::rough);
-    identity = refined ? identify(grey, *refined, families_, reading) : std::nullopt;
+    if (!rough) rough = refine(quad, Effort::rough);
+    identity = rough ? identify(grey, *rough, families_, reading) : std::nullopt;
     if (!identity) return std::nullopt;
+    // The cells of bent paper lie nearer to straight sides; its corners are where the bent sides meet.
+    const bool is_bent = refined && refined->bow_share > k_flat_bow_share &&
+                         !is_blurred(*refined, identity->cells, k_cell_sigmas);
+    if (!is_bent) {
+      const bool has_failed = !refined;
+      refined = rough;
+      if (shortest_side(quad) > k_rough_above_px) add_doubt(quad, has_failed, &*refined);
+    }
+  }
+  if (reading == Reading::covered) {  // perhaps nothing is covered, and the paper is bent
+    const auto whole = worker.refiner.refine(grey, start, min_contrast, lens, Effort::full, Sides::whole);
+    if (whole && whole->bow_share > k_flat_bow_share &&
+        largest_variance(*whole) < k_surer * largest_variance(*refined))
+      refined = whole;
   }
   const bool is_followed = last && last->marker == identity->marker;
   Read read;
@@ -427,7 +478,7 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
     UnshadowedSides sides = unshadowed_sides(*identity, *refined);
     sides.kept_for = is_light_known ? kept_longer(detection.unshadowed->kept_for) : k_keep_images;
     detection.unshadowed.reset();
-    if (!is_inverted_)  // there shadows are no factors of the light
+    if (!is_inverted_)  // in inverted images shadows are no factors of the light
       shadows = leave_shadow_edges(grey, worker.refiner.light(), identity->cells, lens, &*refined);
     if (shadows == ShadowEdges::none) detection.unshadowed = sides;
   }
@@ -435,7 +486,8 @@ std::optional<Detector::Read> Detector::read(const cv::Mat& grey,
     const auto known = is_followed ? aged(last->by_pattern) : std::nullopt;
     if (!refined->separate || is_blurred(*refined, identity->cells, k_cell_sigmas))
       detection.by_pattern = settle_overlapping_edges(grey, lens, *identity, worker, known, &*refined);
-    if (!detection.by_pattern && !covered && !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
+    if (!detection.by_pattern && !covered && refined->bow_share < k_flat_bow_share &&
+        !is_blurred(*refined, identity->cells, k_retreat_sigmas) &&
         std::ranges::all_of(refined->corner_visible, std::identity()))
       read.bleed = find_edge_bleed(grey, worker.refiner.light(), refined->corners_px, identity->cells);
   }
@@ -475,6 +527,7 @@ std::optional<PatternAppearance> Detector::settle_overlapping_edges(
     }
   }
   const bool may_fit = options_.pattern_fits && identity.cells.count > 0 &&
+                       refined->bow_share < k_fit_bow_share &&
                        shortest_side(Quad{refined->corners_px}) > k_fit_above_px;
   if (may_fit)
     if (auto fitted = fit_pattern(grey, light, *refined, identity.cells, lens, &worker.fit)) {

@@ -32,7 +32,8 @@ struct DetectorOptions {
   /// softer their edges are; the correction by the edges of their cells removes most of that (edge_bleed.h).
   Encoding encoding = Encoding::linear;
   /// Also joins straight edges to quadrilaterals, to find markers that are broken up by fingers, bites or
-  /// slatted shadows. Costs about half as much again as the rest. Skipped when no family can_be_covered().
+  /// slatted shadows. Costs about half as much again as the rest. Codes of which no cell can be covered
+  /// (!can_be_covered()) are read with one broken side of the border.
   bool broken_markers = true;
   /// Also fits the whole pattern of markers whose edges blur into each other, which is common for small ones:
   /// their corners become up to ten times better. A fit costs several times what reading a marker costs.
@@ -92,6 +93,7 @@ class Detector {
   // The families whose squares are light are found in the inverted image; null when there are none.
   std::unique_ptr<Detector> of_inverted_;
   cv::Mat inverted_;
+  bool has_uncovered_codes_ = false;  // whether a family's codes are read with one broken side
   Threshold threshold_;
   CornerCodes corner_codes_;
   QuadFinder finder_;
@@ -136,6 +138,12 @@ class Detector {
                            Reading reading,
                            Worker& worker,
                            const Detection* last = nullptr) const;
+  std::optional<Read> read_as(const cv::Mat& grey,
+                              const Quad& quad,
+                              const Lens* lens,
+                              Reading reading,
+                              Worker& worker,
+                              const Detection* last) const;
   std::optional<PatternAppearance> settle_overlapping_edges(const cv::Mat& grey,
                                                             const Lens* lens,
                                                             const Identity& identity,

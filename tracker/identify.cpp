@@ -25,6 +25,15 @@ constexpr double k_border_errors_few_bits = 0.05;
 constexpr double k_border_errors_covered = 0.25;
 constexpr std::array<double, 4> k_hidden_below = {0, 0.2, 0.4, 0.6};
 constexpr int k_few_bits = 25;
+// Cells of one side of the border, between its corners, that may read white where something lies over that
+// side.
+constexpr int k_broken_side_errors = 3;
+// Largest probability that random cells are a code of a family that is read there.
+constexpr double k_max_broken_hit = 0.007;
+// Codes with fewer changes between neighbouring cells along rows, or along columns, look like stripes and
+// edges: the mean margin of their cells must be at least this.
+constexpr int k_min_changes = 4;
+constexpr double k_min_striped_margin = 0.8;
 // Smallest mean margin of the cells (0: at the limit between black and white, 1: as black or white as beside
 // the edge). Clutter has less.
 constexpr double k_min_margin = 0.35;
@@ -39,7 +48,8 @@ constexpr double k_min_template_variance = 0.02;  // standard deviation of a fif
 constexpr double k_min_barcode_margin = 0.4;
 constexpr double k_min_mean_barcode_margin = 0.75;
 constexpr double k_barcode_border_errors = 0.02;
-constexpr double k_quarter = 0.25;  // width of a barcode's border, as share of the side
+constexpr double k_surroundings = 0.06;  // distance of the paper beside a square that is looked at, in sides
+constexpr double k_quarter = 0.25;       // width of a barcode's border, as share of the side
 
 struct Bits {
   std::uint64_t code = 0;
@@ -47,6 +57,13 @@ struct Bits {
   double mean_margin = 0;
   int border_errors = 0;
   int border_cells = 0;
+  std::array<int, 4> side_errors{};  // errors on each side of the border, without its corners
+
+  // Whether all errors of the border lie on one side, and are few.
+  bool one_side_is_broken() const {
+    const int most = *std::max_element(side_errors.begin(), side_errors.end());
+    return border_errors == most && most <= k_broken_side_errors;
+  }
 };
 
 Bits bits_of(const Grid& values, const CodeGrid& grid) {
@@ -59,7 +76,12 @@ Bits bits_of(const Grid& values, const CodeGrid& grid) {
       if (cell == CodeGrid::k_unused) continue;
       if (cell < 0) {
         ++bits.border_cells;
-        bits.border_errors += (value > 0) != (cell == CodeGrid::k_light);
+        const bool is_wrong = (value > 0) != (cell == CodeGrid::k_light);
+        bits.border_errors += is_wrong;
+        const int last = grid.width - 1;
+        const bool across = row == 0 || row == last, down = column == 0 || column == last;
+        if (is_wrong && across != down)
+          ++bits.side_errors[across ? (row == 0 ? 0 : 2) : (column == 0 ? 3 : 1)];
         continue;
       }
       bits.code |= std::uint64_t{value > 0} << cell;
@@ -162,6 +184,26 @@ double random_hit(const CodeFamily& family, int readable, int errors) {
   return std::min(1.0, 4 * static_cast<double>(family.codes.size()) * words / std::ldexp(1.0, readable));
 }
 
+// Whether the cells change seldom along rows or along columns: stripes and edges look like such codes.
+bool is_striped(std::uint64_t code, int cells) {
+  int along = 0, down = 0;
+  const auto is_white = [&](int row, int column) { return (code >> (row * cells + column)) & 1; };
+  for (int row = 0; row < cells; ++row)
+    for (int column = 0; column + 1 < cells; ++column) {
+      along += is_white(row, column) != is_white(row, column + 1);
+      down += is_white(column, row) != is_white(column + 1, row);
+    }
+  return std::min(along, down) < k_min_changes;
+}
+
+// Whether the cells are a code without a doubt, but for a part of one side of the border.
+bool is_clear_beside_broken_side(const CodeFamily& family, const Bits& bits) {
+  return bits.one_side_is_broken() && bits.mean_margin >= k_min_margin_few_bits &&
+         random_hit(family, family.cells * family.cells, 0) <= k_max_broken_hit &&
+         nearest(family.codes, bits.code, ~std::uint64_t{0}).errors == 0 &&
+         (bits.mean_margin >= k_min_striped_margin || !is_striped(bits.code, family.cells));
+}
+
 bool read_code(const std::vector<CodeFamily>& families,
                const CodeFamily& family,
                const Bits& bits,
@@ -194,6 +236,11 @@ void read_code(const std::vector<CodeFamily>& families,
   const bool few = count <= k_few_bits;
   const bool covered = reading == Reading::covered;
   if (covered && !can_be_covered(family)) return;
+  if (reading == Reading::broken_side) {
+    if (can_have_broken_side(family) && is_clear_beside_broken_side(family, bits))
+      read_code(families, family, bits, limit, readable_bits(bits, count, 0), readings);
+    return;
+  }
   const double border_share = covered ? k_border_errors_covered
                               : few   ? k_border_errors_few_bits
                                       : k_border_errors;
@@ -341,7 +388,7 @@ void read_codes(const QuadReader& reader,
                 const std::vector<CodeFamily>& families,
                 Reading reading,
                 Readings* readings) {
-  const std::size_t limits = reading == Reading::open ? 1 : k_limits.size();
+  const std::size_t limits = reading == Reading::covered ? k_limits.size() : 1;
   CellSamples samples;
   std::array<Bits, k_limits.size()> bits;
   const CodeFamily* last = nullptr;
@@ -359,6 +406,20 @@ void read_codes(const QuadReader& reader,
   }
 }
 
+// Whether the paper around the square is light, but for a part that something dark may hide.
+bool has_light_surroundings(const QuadReader& reader) {
+  constexpr int k_places = 8;  // places along a side
+  Places places;
+  for (int i = 0; i < k_places; ++i) {
+    const double along = (i + 0.5) / k_places;
+    places.add(along, -k_surroundings);
+    places.add(1 + k_surroundings, along);
+    places.add(along, 1 + k_surroundings);
+    places.add(-k_surroundings, along);
+  }
+  return reader.light_places(places) >= 4 * k_places * 3 / 4;
+}
+
 std::optional<Identity> read(const QuadReader& reader,
                              const Families& families,
                              Reading reading,
@@ -366,6 +427,8 @@ std::optional<Identity> read(const QuadReader& reader,
   std::array<std::byte, 1 << 14> buffer;  // enough in nearly all cases
   std::pmr::monotonic_buffer_resource memory(buffer.data(), buffer.size());
   Readings readings(certainty, &memory);
+  const bool exact = reading == Reading::broken_side;
+  if (exact && !has_light_surroundings(reader)) return std::nullopt;
   read_codes(reader, families.codes(), reading, &readings);
   if (reading == Reading::open) {
     read_barcodes(reader, families, &readings);
@@ -374,7 +437,7 @@ std::optional<Identity> read(const QuadReader& reader,
       add_rival_barcodes(reader, families, &readings);
   }
   if (auto chosen = choose_reading(reader, readings)) return chosen;
-  if (families.wide_borders().empty() || !has_wide_border(reader)) return std::nullopt;
+  if (exact || families.wide_borders().empty() || !has_wide_border(reader)) return std::nullopt;
   Readings wide(certainty, &memory);
   read_codes(reader, families.wide_borders(), reading, &wide);
   return choose_reading(reader, wide);
@@ -387,6 +450,10 @@ bool can_be_covered(const CodeFamily& family) {
   return !is_barcode(family) && family.grid.rings == 0 && family.max_errors.size() > 1;
 }
 
+bool can_have_broken_side(const CodeFamily& family) {
+  return !is_barcode(family) && family.grid.rings == 0 && family.border_cells == 1 && !can_be_covered(family);
+}
+
 bool has_dark_border(const cv::Mat& grey, const RefinedQuad& quad, double border) {
   return identity::is_border_dark(identity::QuadReader(grey, quad, 0), border);
 }
@@ -396,8 +463,8 @@ std::optional<Identity> identify(const cv::Mat& grey,
                                  const Families& families,
                                  Reading reading,
                                  Certainty certainty) {
-  const double beyond = families.reach();
-  if (reading == Reading::covered)
+  const double beyond = std::max(families.reach(), reading == Reading::open ? 0 : identity::k_surroundings);
+  if (reading != Reading::open)
     return identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty);
   if (auto found = identity::read(identity::QuadReader(grey, quad, beyond), families, reading, certainty))
     return found;

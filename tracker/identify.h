@@ -29,13 +29,19 @@ bool has_dark_border(const cv::Mat& grey, const RefinedQuad& quad, double border
 
 /// What may be assumed when a quad is read.
 enum class Reading {
-  open,    ///< all cells are visible, in uniform light
+  open,  ///< all cells are visible, in uniform light
+  /// Something may lie over a part of the border along one side. Only codes that are not read when covered
+  /// (can_have_broken_side), with every cell right and light paper around.
+  broken_side,
   covered  ///< cells may be hidden and shadows may cross: codes only, hidden bits are counted as hidden
 };
 
 /// Whether codes of the family are read where cells are hidden. Families with few bits are not, because
 /// clutter shows some of their codes by chance, and neither are those with cells around their square.
 bool can_be_covered(const CodeFamily& family);
+
+/// Whether codes of the family are read with one broken side: those of which no cell can be covered.
+bool can_have_broken_side(const CodeFamily& family);
 
 /// Whether an identity's score is computed.
 enum class Certainty {

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <span>
 
+#include "tracker/identify.h"
 #include "tracker/quad_reader.h"
 #include "tracker/quad_sampler.h"
 #include "tracker/simd.h"
@@ -42,6 +44,46 @@ std::array<std::uint8_t, count> nearest_levels(const cv::Mat& grey,
   std::array<std::uint8_t, count> levels;
   QuadSampler(grey, quad.corners_px).nearest(places[0], places[1], levels.data());
   return levels;
+}
+
+// The cells of a code, border included, read at one pixel each.
+constexpr int k_most_coarse_side = 8;
+struct CoarseCells {
+  int count = 0;            // cells along a side, without the border
+  bool has_border = false;  // whether the border is dark, but for some cells
+  std::uint64_t code = 0;   // the first cell is the highest bit
+};
+
+CoarseCells coarse_cells(const cv::Mat& grey, const Quad& quad, int count) {
+  constexpr std::size_t k_most = k_most_coarse_side * k_most_coarse_side;
+  constexpr int k_most_light_border = 4;
+  const auto side = static_cast<std::size_t>(count) + 2;
+  std::array<std::array<float, k_most>, 2> at;
+  for (std::size_t i = 0; i < side * side; ++i) {
+    at[0][i] = (static_cast<float>(i % side) + 0.5F) / static_cast<float>(side);
+    at[1][i] = (static_cast<float>(i / side) + 0.5F) / static_cast<float>(side);
+  }
+  std::array<std::uint8_t, k_most> levels, border;
+  QuadSampler(grey, quad.corners_px)
+      .nearest(std::span(at[0]).first(side * side), std::span(at[1]).first(side * side), levels.data());
+  const auto is_border = [&](std::size_t i) {
+    return i < side || i >= side * (side - 1) || i % side == 0 || i % side == side - 1;
+  };
+  int border_cells = 0;
+  std::uint8_t lightest = 0;
+  for (std::size_t i = 0; i < side * side; ++i)
+    if (is_border(i))
+      border[static_cast<std::size_t>(border_cells++)] = levels[i];
+    else
+      lightest = std::max(lightest, levels[i]);
+  const int dark = level_of_rank(border.data(), border_cells, border_cells / 2);
+  const double middle = dark + k_middle * (lightest - dark);
+  CoarseCells cells{count};
+  cells.has_border = std::count_if(border.begin(), border.begin() + border_cells,
+                                   [&](int level) { return level > middle; }) <= k_most_light_border;
+  for (std::size_t i = 0; i < side * side; ++i)
+    if (!is_border(i)) cells.code = (cells.code << 1) | std::uint64_t{levels[i] > middle};
+  return cells;
 }
 
 }  // namespace
@@ -122,6 +164,19 @@ bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
       changes += i + k_cells < inside.size() && is_light != (inside[i + k_cells] > limit);
     }
     return changes >= k_min_changes;
+  });
+}
+
+bool may_be_code_with_broken_side(const cv::Mat& grey, const Quad& quad, const Families& families) {
+  constexpr int k_most_wrong = 2;
+  CoarseCells cells;
+  return std::ranges::any_of(families.codes(), [&](const CodeFamily& family) {
+    if (!can_have_broken_side(family) || family.cells + 2 > k_most_coarse_side) return false;
+    if (family.cells != cells.count) cells = coarse_cells(grey, quad, family.cells);
+    return cells.has_border && std::ranges::any_of(family.codes, [&](const auto& turns) {
+             return std::ranges::any_of(
+                 turns, [&](std::uint64_t turn) { return std::popcount(turn ^ cells.code) <= k_most_wrong; });
+           });
   });
 }
 

@@ -3,6 +3,7 @@
 #include <opencv2/core/mat.hpp>
 
 #include "tracker/candidates.h"
+#include "tracker/family.h"
 
 namespace limn::tracker {
 
@@ -16,5 +17,9 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast, d
 /// Whether it could be a code that is partly hidden: most of the border is dark, and the cells change as
 /// often as a code's do. Rejects nine in ten quadrilaterals of clutter.
 bool may_be_covered_code(const cv::Mat& grey, const Quad& quad);
+
+/// Whether the nearest pixels show a code that can_have_broken_side(), but for two cells, and a border that
+/// is dark, but for four. Costs as much as may_be_covered_code.
+bool may_be_code_with_broken_side(const cv::Mat& grey, const Quad& quad, const Families& families);
 
 }  // namespace limn::tracker

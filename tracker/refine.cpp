@@ -27,7 +27,8 @@ constexpr double k_noise_of_two = 2;
 // first: grey paper, then a white table.
 constexpr double k_valley_share = 0.35;
 constexpr double k_settled_px = 2e-3;
-constexpr double k_near_start_px = 0.1;  // corners that moved less need no second round
+constexpr double k_settled_corner_px = 0.05;  // corners of bent sides that moved more need a third round
+constexpr double k_near_start_px = 0.1;       // corners that moved less need no second round
 constexpr int k_max_reach = 10;
 constexpr int k_rough_rows = 12;  // rows of a side for Effort::rough
 constexpr double k_huber = 1.5;   // in robust standard deviations
@@ -39,13 +40,27 @@ constexpr double k_end_share = 0.1;      // or within this share of the side
 constexpr double k_min_scale_px = 0.04;  // smaller residuals are no reason to reject
 constexpr double k_consensus_px = 0.2;   // typical residual of crossings on one line
 constexpr int k_min_crossings = 3;
+// A side's own correlation counts with this factor beside the mean of all sides, which is known better.
+constexpr double k_own_correlation = 1.0 / 3;
 constexpr std::size_t k_min_bent_crossings = 12;
 // A smaller bow is treated as noise: one straight side in 370 shows as much.
 constexpr double k_bow_deviations = 3;
 // Largest bow in half a side: paper around a cylinder eight sides wide, seen along its edge (sagitta half^2 /
 // 2R). With half as much again, the corner lies elsewhere.
 constexpr double k_max_bow_share = 0.0625;
-constexpr double k_no_bow_share = 1.5 * k_max_bow_share;
+constexpr double k_no_bow_factor = 1.5;
+// Sides with a larger bow than the first of these shares are fitted as curves, and so are the sides opposite
+// to them; the largest bow of a curve is that of a cylinder of a radius of .8 sides, tilted by 45 degrees.
+// Shorter sides show too little of it.
+constexpr double k_min_curve_bow_share = 0.02, k_max_curve_bow_share = 0.22;
+constexpr std::size_t k_min_curve_crossings = 24;
+// Standard deviation of the terms of third and fourth order, at half a side: a share of the bow; less where
+// the bow is a smaller share of half the side than this.
+constexpr double k_curve_share = 0.1, k_curved_bow_share = 0.06;
+// Standard deviation of a bent side's place, as share of its bow, and the bow's share of half the side at
+// which it is twice as large: measured on cylinders.
+constexpr double k_bow_doubt = 0.006, k_strong_bow_share = 0.1;
+constexpr double k_min_room_px = 0.75;  // smallest distance of an edge from the outermost pixels' centres
 
 // The bow of a lens against the chord, in v: t (1 - t) (c0 + c1 t + c2 t^2), with t from 0 to 1 along the
 // chord.
@@ -86,6 +101,8 @@ Bow bow_of(const Lens& lens, const Eigen::Vector2d& from, const Eigen::Vector2d&
   return bow;
 }
 
+constexpr double k_bow_evidence = k_bow_deviations * k_bow_deviations;
+
 struct Belief {
   double share;        // share of the bow that is applied
   double probability;  // probability that there is a bow
@@ -94,15 +111,14 @@ struct Belief {
 // The share is the non-negative garrote (Breiman 1995), 1 - (k s / b)^2 for a bow b with standard deviation
 // s. It grows steadily with the evidence, so that a corner does not jump between frames whose evidence lies
 // on either side of a limit; a clear bow keeps its whole size. The probability is one half at that limit.
-Belief belief_in_bow(const EdgeRefiner::EdgeLine& bent, double half) {
-  const double bow_share = std::abs(bent.curvature) * half;
+Belief belief_in_bow(const EdgeRefiner::EdgeLine& bent) {
+  const double most = bent.is_curved ? k_max_curve_bow_share : k_max_bow_share;
   const double plausible =
-      std::clamp((k_no_bow_share - bow_share) / (k_no_bow_share - k_max_bow_share), 0.0, 1.0);
-  constexpr double k_limit = k_bow_deviations * k_bow_deviations;
+      std::clamp((k_no_bow_factor * most - bent.bow_share()) / ((k_no_bow_factor - 1) * most), 0.0, 1.0);
   if (bent.curvature == 0) return {0, 0};  // exactly 0, with a covariance of 0
   const double evidence = bent.curvature * bent.curvature / bent.covariance(2, 2);
-  return {plausible * std::max(0.0, 1 - k_limit / evidence),
-          plausible / (1 + std::exp(0.5 * (k_limit - evidence)))};
+  return {plausible * std::max(0.0, 1 - k_bow_evidence / evidence),
+          plausible / (1 + std::exp(0.5 * (k_bow_evidence - evidence)))};
 }
 
 // The weighted mean of both lines. Its covariance includes the expected square error if either line is the
@@ -112,10 +128,12 @@ EdgeRefiner::EdgeLine averaged(const EdgeRefiner::EdgeLine& straight,
                                const Belief& belief) {
   const auto& [share, probability] = belief;
   EdgeRefiner::EdgeLine line = straight;
-  const Eigen::Vector3d apart(bent.offset - straight.offset, bent.slope - straight.slope, bent.curvature);
+  const EdgeRefiner::EdgeLine::Terms apart = bent.terms() - straight.terms();
   line.offset += share * apart[0];
   line.slope += share * apart[1];
-  line.curvature = share * apart[2];
+  line.curvature += share * apart[2];
+  line.third += share * apart[3];
+  line.fourth += share * apart[4];
   const double off = probability * (1 - share) * (1 - share) + (1 - probability) * share * share;
   line.covariance =
       (1 - share) * straight.covariance + share * bent.covariance + off * apart * apart.transpose();
@@ -149,10 +167,15 @@ Window whole(std::size_t low, std::size_t high) {
   return window;
 }
 
+// Places of the profile, [first, last).
+struct Places {
+  std::size_t first, last;
+};
+
 // A window that reaches equally far to both sides of the edge's centre: as far as [from, to) does on its
-// longer side. If it cut off more of the blur on one side, all crossings of the line would shift alike, which
-// their residuals do not show.
-Window centred(const Profile& mean, std::size_t size, double from, double to) {
+// longer side, within the places that lie in the image. If it cut off more of the blur on one side, all
+// crossings of the line would shift alike, which their residuals do not show.
+Window centred(const Profile& mean, std::size_t size, const Places& in_image, double from, double to) {
   Profile parts{};
   double centre = 0.5 * (from + to);
   double half = centre - from;
@@ -170,7 +193,9 @@ Window centred(const Profile& mean, std::size_t size, double from, double to) {
     centre = moment / sum;
     if (!(centre > 0 && centre < static_cast<double>(size)))  // gradients of both signs
       return whole(static_cast<std::size_t>(from), static_cast<std::size_t>(std::ceil(to)));
-    half = std::min({std::max(centre - from, to - centre), centre, static_cast<double>(size) - centre});
+    half = std::min({std::max(centre - from, to - centre), centre - static_cast<double>(in_image.first),
+                     static_cast<double>(in_image.last) - centre});
+    if (!(half > 0)) return whole(static_cast<std::size_t>(from), static_cast<std::size_t>(std::ceil(to)));
   }
   return {static_cast<std::size_t>(centre - half),
           std::min(size, static_cast<std::size_t>(std::ceil(centre + half))), parts};
@@ -237,17 +262,27 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   gradients_.resize(profile * static_cast<std::size_t>(std::max(0, last - first + 1)));
   double* gradient = gradients_.data();
   Profile mean{};
+  Places in_image{0, profile};  // places that all rows have
   const int stride = effort == Effort::rough ? 1 + (last - first) / k_rough_rows : 1;
   for (int u = first; u <= last; u += stride) {
     const double straight =
         before && before->flat == line->flat ? before->at(u) : from[v_axis] + (u - from[u_axis]) * slope;
     const double v = straight + bow.at(u);
-    if (!(v > reach && v < v_limit - 1 - reach)) continue;
+    if (!(v > k_min_room_px && v < v_limit - 1 - k_min_room_px)) continue;
     const int centre = static_cast<int>(v + 0.5);
     const std::uint8_t* pixel = line->flat ? grey.ptr(centre) + u : grey.ptr(u) + centre;
-    pixel -= reach * v_stride;
+    // The number of places that lie in the image before and behind the centre; the others have no gradient.
+    const int before_centre = std::min(reach, inward > 0 ? centre : v_limit - 1 - centre);
+    const int behind_centre = std::min(reach, inward > 0 ? v_limit - 1 - centre : centre);
+    const auto row_first = static_cast<std::size_t>(reach - before_centre);
+    const auto row_last = static_cast<std::size_t>(reach + behind_centre);
+    if (row_first > 0 || row_last < profile) {
+      in_image = {std::max(in_image.first, row_first), std::min(in_image.last, row_last)};
+      std::fill_n(gradient, profile, 0.0);
+    }
+    pixel -= before_centre * v_stride;
     double level = light_[*pixel];
-    for (std::size_t k = 0; k < profile; ++k) {
+    for (std::size_t k = row_first; k < row_last; ++k) {
       pixel += v_stride;
       const double next = light_[*pixel];
       gradient[k] = level - next;
@@ -257,13 +292,13 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     gradient += profile;
     rows_.push_back({u, centre});
   }
-  if (static_cast<int>(rows_.size()) < k_min_crossings) return false;
+  if (static_cast<int>(rows_.size()) < k_min_crossings || in_image.first >= in_image.last) return false;
 
   // The edge's window [low, high) in the averaged profile. Nearer peaks are preferred to slightly higher
   // ones.
-  std::size_t peak = 0;
+  std::size_t peak = in_image.first;
   double best = 0;
-  for (std::size_t k = 0; k < profile; ++k) {
+  for (std::size_t k = in_image.first; k < in_image.last; ++k) {
     const double distance = std::abs(static_cast<double>(k) + 0.5 - reach);
     const double value = mean[k] / (1 + 0.15 * distance);
     if (value > best) {
@@ -275,14 +310,16 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   std::size_t low = peak;
   std::size_t high = peak + 1;
   const double valley_below = k_valley_share * mean[peak];
-  while (low > 0 && mean[low - 1] > flat_below && !(mean[low] < valley_below && mean[low - 1] > mean[low]))
+  while (low > in_image.first && mean[low - 1] > flat_below &&
+         !(mean[low] < valley_below && mean[low - 1] > mean[low]))
     --low;
-  while (high < profile && mean[high] > flat_below &&
+  while (high < in_image.last && mean[high] > flat_below &&
          !(mean[high - 1] < valley_below && mean[high] > mean[high - 1]))
     ++high;
   // Separate: the profile is flat beyond the window, and neither another edge's slope nor the profile's end
   // is there.
-  line->separate = low >= 2 && high + 2 <= profile && std::abs(mean[low - 1]) <= flat_below &&
+  const bool is_cut = (low == in_image.first && low > 0) || (high == in_image.last && high < profile);
+  line->separate = !is_cut && low >= 2 && high + 2 <= profile && std::abs(mean[low - 1]) <= flat_below &&
                    std::abs(mean[high]) <= flat_below && std::abs(mean[low - 2]) <= 4 * flat_below &&
                    std::abs(mean[high + 1]) <= 4 * flat_below;
   double beyond = 0;  // light beyond the window
@@ -306,8 +343,10 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
     return std::clamp(large, 0.0, 1.0) * (leads > 0 ? std::min(1.0, leads / std::abs(mean[beyond])) : 0.0);
   };
   Window window = whole(low, high);
-  if (low > 1 && high + 1 < profile && is_flat(low - 1) && is_flat(high))
-    window = centred(mean, profile, static_cast<double>(low) - tail(low - 1, low - 2),
+  if (is_cut)
+    window = centred(mean, profile, in_image, static_cast<double>(low), static_cast<double>(high));
+  else if (low > 1 && high + 1 < profile && is_flat(low - 1) && is_flat(high))
+    window = centred(mean, profile, in_image, static_cast<double>(low) - tail(low - 1, low - 2),
                      static_cast<double>(high) + tail(high, high + 1));
 
   // Rows beside a corner contain the other edge, as far as the blur reaches.
@@ -340,7 +379,7 @@ bool EdgeRefiner::fit_side(const cv::Mat& grey,
   line->outside_level = outside_sum / kept;
   if (line->outside_level - line->inside_level < min_contrast) return false;
   double variance = 0;
-  if (!fit_line(effort, sides, line, &variance)) return false;
+  if (!fit_line(effort, sides, before && before->is_curved, line, &variance)) return false;
   line->covariance(0, 0) += unknown_px * unknown_px / 6;
   line->correlation = effort == Effort::full ? correlation_along(*line, variance) : 1;
   find_ends(from[u_axis], to[u_axis], std::max(trim, blur_trim), variance, line);
@@ -360,23 +399,38 @@ void EdgeRefiner::settle_shares(Effort effort) {
   for (double& share : crossings_.share) share = std::min(1.0, share * scale);
 }
 
-// Fits a straight and a bent line, and averages them by the evidence for a bow.
-bool EdgeRefiner::fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance) {
+// Fits a straight and a bent line, and averages them by the evidence for a bow. `is_curved`: the round
+// before showed a curve.
+bool EdgeRefiner::fit_line(Effort effort, Sides sides, bool is_curved, EdgeLine* line, double* variance) {
   double u_sum = 0;
   for (const double u : crossings_.u) u_sum += u;
   line->u_middle = u_sum / static_cast<double>(crossings_.u.size());
   crossings_.d.resize(crossings_.u.size());
   crossings_.residual.resize(crossings_.u.size());
   for (std::size_t i = 0; i < crossings_.u.size(); ++i) crossings_.d[i] = crossings_.u[i] - line->u_middle;
+  line->half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
   const bool covered = sides == Sides::covered;
   if (covered) find_consensus(line);
   *variance = fit_terms(2, covered, line);
   if (!(*variance >= 0)) return false;
+  line->bent_terms.setZero();
+  line->is_curved = is_curved && crossings_.u.size() >= k_min_curve_crossings;
   if (covered || effort == Effort::rough || crossings_.u.size() < k_min_bent_crossings) return true;
   EdgeLine bent = *line;
   if (!(fit_terms(3, false, &bent) >= 0)) return true;
-  const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
-  *line = averaged(*line, bent, belief_in_bow(bent, half));
+  if (crossings_.u.size() >= k_min_curve_crossings &&
+      bent.curvature * bent.curvature > k_bow_evidence * bent.covariance(2, 2))
+    line->bent_terms = bent.terms();
+  const Belief belief = belief_in_bow(bent);
+  if (bent.is_curved && belief.share > 0) {
+    EdgeLine curve = bent;
+    if (fit_curve(variance, &curve)) bent = curve;
+  }
+  *line = averaged(*line, bent, belief);
+  if (line->is_curved) {
+    const double doubt_px = k_bow_doubt * line->bow_px() * (1 + line->bow_share() / k_strong_bow_share);
+    line->covariance(0, 0) += doubt_px * doubt_px;
+  }
   return true;
 }
 
@@ -502,13 +556,13 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
   double* residual = crossings_.residual.data();
   double scale = 0;  // 0: no robust weights yet
   double variance = -1;
-  const double half = 0.5 * std::abs(crossings_.u.back() - crossings_.u.front());
+  const double half = line->half;
   if (from_line) {
     const Eigen::Vector3d start(line->offset, line->slope, line->curvature);
     new_residuals(d, v, share, count, start, k_all, k_all, residual);
     scale = k_consensus_px;
   } else {
-    line->offset = line->slope = line->curvature = 0;
+    line->offset = line->slope = line->curvature = line->third = line->fourth = 0;
     std::fill_n(residual, count, 0.0);
   }
   for (int round = 0; round < k_rounds; ++round) {
@@ -537,7 +591,8 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
     const Spread spread =
         new_residuals(d, v, share, count, solution, scale > 0 ? 3 * scale : k_all, foreign, residual);
     variance = spread.squares / std::max(1.0, spread.count - terms);  // for a row with full contrast
-    line->covariance = inverse * variance;
+    line->covariance.setZero();
+    line->covariance.topLeftCorner<3, 3>() = inverse * variance;
     // The fit has converged and later rounds have nothing to reject.
     if (round > 0 && moved < k_settled_px && spread.largest < k_reject * std::max(scale, k_min_scale_px))
       break;
@@ -550,6 +605,72 @@ double EdgeRefiner::fit_terms(int terms, bool from_line, EdgeLine* line) {
   return variance;
 }
 
+// Weighted least squares of all five terms, with robust weights, starting from a bent line. The terms of
+// third and fourth order are expected to be as large as those of a cylinder in perspective, a share of the
+// bow (ridge regression), so that they do no harm where the crossings do not show them. False when the
+// crossings do not determine the terms.
+bool EdgeRefiner::fit_curve(double* variance, EdgeLine* line) {
+  constexpr int k_huber_rounds = 3;
+  constexpr int k_rounds = 5;
+  using Matrix = Eigen::Matrix<double, 5, 5>;
+  using Terms = EdgeLine::Terms;
+  const std::size_t count = crossings_.u.size();
+  const auto row_of = [&](std::size_t i) {
+    const double t = crossings_.d[i] / line->half;
+    Terms row;
+    row << 1, t, t * t, t * t * t, t * t * t * t;
+    return row;
+  };
+  Terms scales;  // the terms for d are those for t times these
+  scales << 1, 1 / line->half, 0, 0, 0;
+  for (int i = 2; i < 5; ++i) scales[i] = scales[i - 1] * scales[1];
+  Terms terms = line->terms().cwiseQuotient(scales);
+  const double bow_share = std::abs(line->curvature) * line->half;
+  const double expected_px = k_curve_share * line->bow_px() * std::min(1.0, bow_share / k_curved_bow_share);
+  Matrix covariance;
+  for (int round = 0; round < k_rounds; ++round) {
+    deviations_.resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double size = crossings_.share[i] * std::abs(crossings_.v[i] - row_of(i).dot(terms));
+      crossings_.residual[i] = size;
+      deviations_[i] = static_cast<float>(size);
+    }
+    const double scale = std::max(1.4826 * median_of_sizes(&deviations_), 1e-3);
+    const double foreign = round < k_huber_rounds ? std::numeric_limits<double>::infinity()
+                                                  : k_reject * std::max(scale, k_min_scale_px);
+    Matrix normal = Matrix::Zero();
+    Terms right = Terms::Zero();
+    for (std::size_t i = 0; i < count; ++i) {
+      const double r = crossings_.residual[i];
+      if (r > foreign) continue;
+      const double bounded = r > k_huber * scale ? k_huber * scale / r : 1.0;
+      const double w = crossings_.share[i] * crossings_.share[i] * bounded;
+      const Terms row = row_of(i);
+      normal += w * row * row.transpose();
+      right += w * crossings_.v[i] * row;
+    }
+    const double expected = std::max(*variance, 1e-6) / std::max(expected_px * expected_px, 1e-9);
+    normal(3, 3) += expected, normal(4, 4) += expected;
+    const Eigen::LDLT<Matrix> solver(normal);
+    terms = solver.solve(right);
+    if (!terms.allFinite() || !(solver.vectorD().minCoeff() > 1e-6 * normal(0, 0))) return false;
+    double squares = 0, kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (crossings_.residual[i] > foreign) continue;
+      const double r = crossings_.share[i] * (crossings_.v[i] - row_of(i).dot(terms));
+      squares += std::min(r * r, 9 * scale * scale);
+      ++kept;
+    }
+    *variance = squares / std::max(1.0, kept - 5);
+    covariance = *variance * solver.solve(Matrix::Identity());
+  }
+  terms = terms.cwiseProduct(scales);
+  line->covariance = scales.asDiagonal() * covariance * scales.asDiagonal();
+  line->offset = terms[0], line->slope = terms[1], line->curvature = terms[2];
+  line->third = terms[3], line->fourth = terms[4];
+  return true;
+}
+
 // Ratio by which the line's variance grows because the errors of neighbouring crossings are correlated,
 // through print, paper, shadows and JPEG. From sums of residuals over blocks (the "sandwich", Liang and Zeger
 // 1986).
@@ -559,7 +680,7 @@ double EdgeRefiner::correlation_along(const EdgeLine& line, double variance) con
   const std::size_t count = crossings_.u.size();
   const std::size_t rows = std::max(k_least_rows, (count + k_blocks - 1) / k_blocks);
   const double blocks = static_cast<double>(count) / static_cast<double>(rows);
-  const double terms = line.curvature == 0 ? 2 : 3;
+  const double terms = line.curvature == 0 ? 2 : line.fourth == 0 ? 3 : 5;
   if (blocks < terms + 1) return 1;
   const double bound = k_reject * std::sqrt(variance);
   double together = 0;
@@ -626,6 +747,30 @@ bool intersect(const EdgeRefiner::EdgeLine& a,
   return corner->allFinite();
 }
 
+// The bow of a side's bent line, as a vector across it, in shares of half its length.
+Eigen::Vector2d bow_across(const EdgeRefiner::EdgeLine& line) {
+  const double slope = line.bent_terms[1];
+  const Eigen::Vector2d across = line.flat ? Eigen::Vector2d(-slope, 1) : Eigen::Vector2d(1, -slope);
+  return line.bent_terms[2] * line.half / across.squaredNorm() * across;
+}
+
+// The bow that two opposite sides share, in shares of half their length; 0 where they bend in opposite
+// directions.
+double common_bow(const EdgeRefiner::EdgeLine& a, const EdgeRefiner::EdgeLine& b) {
+  const Eigen::Vector2d bow = bow_across(a), opposite = bow_across(b);
+  return bow.dot(opposite) > 0 ? std::min(bow.norm(), opposite.norm()) : 0;
+}
+
+// Where one of two opposite sides bends strongly, both become curves, which their bent lines begin.
+void begin_curves(std::array<EdgeRefiner::EdgeLine, 4>* lines) {
+  for (std::size_t i = 0; i < 4; ++i) {
+    EdgeRefiner::EdgeLine &line = (*lines)[i], &opposite = (*lines)[(i + 2) % 4];
+    line.is_curved = std::max(bow_across(line).norm(), bow_across(opposite).norm()) > k_min_curve_bow_share;
+    if (!line.is_curved || line.bent_terms.isZero()) continue;
+    line.offset = line.bent_terms[0], line.slope = line.bent_terms[1], line.curvature = line.bent_terms[2];
+  }
+}
+
 bool is_convex(const std::array<Eigen::Vector2d, 4>& corners) {
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector2d a = corners[(i + 1) % 4] - corners[i];
@@ -653,7 +798,7 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
   refined.corners_px = quad.corners_px;
   std::array<EdgeLine, 4> lines;
   // The second round's windows and bow start from the first round's corners.
-  const int rounds = effort == Effort::rough ? 1 : 2;
+  int rounds = effort == Effort::rough ? 1 : 2;
   for (int round = 0; round < rounds; ++round) {
     const double reach =
         std::clamp(0.22 * shortest_side(refined.corners_px), 2.5, static_cast<double>(k_max_reach));
@@ -666,24 +811,38 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
       refined.inside_level[side] = lines[side].inside_level;
       refined.blur_px[side] = lines[side].blur_px;
     }
+    if (round == 0) begin_curves(&lines);
     double correlation = 0;
     for (const EdgeLine& line : lines) correlation += 0.25 * line.correlation;
-    for (EdgeLine& line : lines) line.covariance *= std::max(1.0, correlation);
+    for (EdgeLine& line : lines) {
+      // A bent side of its own correlation has a shape that the terms do not describe.
+      const double own = line.is_curved ? k_own_correlation * line.correlation : 0;
+      line.covariance *= std::max({1.0, correlation, own});
+    }
     std::array<Eigen::Vector2d, 4> corners = refined.corners_px;
     double moved = 0;
     for (std::size_t i = 0; i < 4; ++i) {
       if (!intersect(lines[(i + 3) % 4], lines[i], &corners[i], &refined.corner_covariance[i]))
         return std::nullopt;
-      if ((corners[i] - quad.corners_px[i]).norm() > quad.within_px + 0.1 * reach) return std::nullopt;
+      double within_px = quad.within_px + 0.1 * reach;
+      for (const EdgeLine* line : {&lines[(i + 3) % 4], &lines[i]})
+        if (line->is_curved) within_px = std::max(within_px, quad.within_px + 0.1 * reach + line->bow_px());
+      if ((corners[i] - quad.corners_px[i]).norm() > within_px) return std::nullopt;
       moved = std::max(moved, (corners[i] - refined.corners_px[i]).norm());
       refined.corner_visible[i] = lines[(i + 3) % 4].seen_at_end && lines[i].seen_at_start;
     }
     refined.corners_px = corners;
+    refined.bow_share = 0;
+    for (std::size_t i = 0; i < 2; ++i)
+      refined.bow_share = std::max(refined.bow_share, common_bow(lines[i], lines[i + 2]));
     refined.separate = std::all_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.separate; });
     if (!is_convex(corners)) return std::nullopt;
+    const bool is_curved =
+        std::any_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.is_curved; });
     const bool straight =
         std::all_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.curvature == 0; });
     if (straight && moved < k_near_start_px) break;
+    if (is_curved && round > 0 && moved > k_settled_corner_px) rounds = 3;
   }
   return refined;
 }

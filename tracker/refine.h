@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
@@ -43,6 +44,9 @@ struct RefinedQuad {
   bool separate = true;
   /// Whether both sides are visible next to the corner.
   std::array<bool, 4> corner_visible{};
+  /// Bow that opposite sides share, as a share of half their length: that of bent paper, and 0 where a shadow
+  /// bends one side.
+  double bow_share = 0;
 };
 
 /// Finds where each side's edge crosses the rows (steep sides) or columns (flat sides) of the raw image and
@@ -91,14 +95,21 @@ class EdgeRefiner {
   std::vector<float> deviations_;  // scratch memory of the robust scale
 
  public:
-  /// The line of a side, v = offset + slope * d + curvature * d^2, d = u - u_middle, in the raw image without
-  /// the lens's curvature. Curvature comes from bent paper or from a lens that is not given. It is 0 where
-  /// the crossings do not show it and grows steadily with the evidence.
+  /// The line of a side, v = offset + slope * d + curvature * d^2 + third * d^3 + fourth * d^4,
+  /// d = u - u_middle, in the raw image without the lens's curvature. Curvature comes from bent paper or from
+  /// a lens that is not given; the higher terms come from paper that is bent strongly. They are 0 where the
+  /// crossings do not show them and grow steadily with the evidence.
   struct EdgeLine {
+    using Terms = Eigen::Matrix<double, 5, 1>;
     bool flat = true;  ///< true: u is x and v is y; false: u is y and v is x
     double u_middle = 0;
-    double offset = 0, slope = 0, curvature = 0;
-    Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< covariance of (offset, slope, curvature)
+    double half = 0;  ///< half the length of the crossings, along u
+    double offset = 0, slope = 0, curvature = 0, third = 0, fourth = 0;
+    /// Covariance of the five terms, offset first.
+    Eigen::Matrix<double, 5, 5> covariance = Eigen::Matrix<double, 5, 5>::Zero();
+    Terms bent_terms = Terms::Zero();  ///< terms of the fit with curvature, where the curvature is clear
+    bool is_curved =
+        false;  ///< this side or the opposite one bends strongly: terms of third and fourth order are fitted
     double correlation = 1;  ///< the variance over that for independent crossings
     double outside_level = 0, inside_level = 0;
     double blur_px = 0;
@@ -108,13 +119,22 @@ class EdgeRefiner {
 
     double at(double u) const {
       const double d = u - u_middle;
-      return offset + d * (slope + d * curvature);
+      return offset + d * (slope + d * (curvature + d * (third + d * fourth)));
     }
-    double slope_at(double u) const { return slope + 2 * curvature * (u - u_middle); }
+    double slope_at(double u) const {
+      const double d = u - u_middle;
+      return slope + d * (2 * curvature + d * (3 * third + d * 4 * fourth));
+    }
+    Terms terms() const { return {offset, slope, curvature, third, fourth}; }
+    /// The bow of the quadratic term between the ends and the middle, px.
+    double bow_px() const { return std::abs(curvature) * half * half; }
+    /// The same, as a share of half the length.
+    double bow_share() const { return std::abs(curvature) * half; }
     /// Variance of at(u).
     double variance(double u) const {
       const double d = u - u_middle;
-      const Eigen::Vector3d row(1, d, d * d);
+      Terms row;
+      row << 1, d, d * d, d * d * d, d * d * d * d;
       return row.dot(covariance * row);
     }
   };
@@ -131,10 +151,11 @@ class EdgeRefiner {
                 const EdgeLine* before,
                 EdgeLine* line);
   void settle_shares(Effort effort);
-  bool fit_line(Effort effort, Sides sides, EdgeLine* line, double* variance);
+  bool fit_line(Effort effort, Sides sides, bool is_curved, EdgeLine* line, double* variance);
   void find_ends(double from, double to, double trim, double variance, EdgeLine* line) const;
   double correlation_along(const EdgeLine& line, double variance) const;
   double fit_terms(int terms, bool from_line, EdgeLine* line);
+  bool fit_curve(double* variance, EdgeLine* line);
   void find_consensus(EdgeLine* line);
 };
 

@@ -12,6 +12,18 @@ constexpr int k_shares = 3;  // shares of the work for each thread, because some
 
 constexpr int k_tile = 4;
 
+// The range of a flat tile's 16 levels is 3.5 standard deviations of the noise on average; three in ten flat
+// tiles have less than 3.1.
+constexpr double k_tile_range_deviations = 3.1;
+constexpr double k_flat_share = 0.3;
+// The range over the surroundings, 144 pixels, reaches 8 deviations once in ten thousand places.
+constexpr double k_noise_contrast = 8;
+constexpr double k_min_noise = 2.4;        // levels: less noise does not reach the smallest contrast
+constexpr int k_most_noise_contrast = 28;  // more is texture or clutter
+constexpr int k_every_row = 4;             // one of this many rows of tiles is measured
+// Levels that are cut off show less noise.
+constexpr int k_lowest_level = 2, k_highest_level = 253;
+
 std::size_t index(int x, int y, int width) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
 }
@@ -119,12 +131,33 @@ void Threshold::apply(const cv::Mat& grey,
     measure_tiles(grey, rows);
     widen_tiles(rows.first, rows.last);
   });
+  ThresholdOptions limits = options;
+  if (options.above_noise) limits.min_contrast = contrast_above_noise(options.min_contrast);
+  is_noisy_ = limits.min_contrast > options.min_contrast;
   for (int reach = 1; reach < options.reach; ++reach) {
     join_rows();
     widen_tiles(0, tiles_y_);
   }
   team.parallel_for(shares,
-                    [&](int i) { compare(grey, options, rows_[static_cast<std::size_t>(i)], corners); });
+                    [&](int i) { compare(grey, limits, rows_[static_cast<std::size_t>(i)], corners); });
+}
+
+int Threshold::contrast_above_noise(int min_contrast) const {
+  std::array<int, 256> tiles{};  // by their range
+  int count = 0;
+  for (int y = k_every_row / 2; y < tiles_y_; y += k_every_row)
+    for (int x = 0; x < tiles_x_; ++x) {
+      const std::size_t i = index(x, y, tiles_x_);
+      if (darkest_[i] < k_lowest_level || brightest_[i] > k_highest_level) continue;
+      ++tiles[static_cast<std::size_t>(brightest_[i] - darkest_[i])];
+      ++count;
+    }
+  int below = 0, range = 0;
+  while (range < 255 && below + tiles[static_cast<std::size_t>(range)] <= k_flat_share * count)
+    below += tiles[static_cast<std::size_t>(range++)];
+  const double noise = range / k_tile_range_deviations;
+  if (noise < k_min_noise) return min_contrast;
+  return std::max(min_contrast, std::min(k_most_noise_contrast, static_cast<int>(k_noise_contrast * noise)));
 }
 
 // The last tile of a row or column also includes the remaining pixels, which are too few for a tile.

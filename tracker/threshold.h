@@ -30,6 +30,9 @@ struct ThresholdOptions {
   int share = 128;
   /// Radius of the surroundings, in tiles of 4 pixels.
   int reach = 1;
+  /// Raises min_contrast to a multiple of the image's noise where noise alone would reach it, so that flat
+  /// regions stay empty in dark rooms as well.
+  bool above_noise = false;
 };
 
 /// A pixel is black when it is darker than the threshold between the darkest and the brightest level of its
@@ -42,6 +45,9 @@ class Threshold {
   /// `grey` is 8-bit, one channel, not empty. The result does not depend on the team's size.
   void apply(const cv::Mat& grey, const ThresholdOptions& options, CornerCodes& corners, WorkerTeam& team);
 
+  /// Whether the last image's noise raised the smallest contrast.
+  bool is_noisy() const { return is_noisy_; }
+
  private:
   // Buffers for one share of the rows of tiles.
   struct Rows {
@@ -49,6 +55,7 @@ class Threshold {
     std::vector<std::uint8_t> low, high, limit;
     std::vector<std::uint8_t> above, here;  // two rows of black pixels, starting at column -1
   };
+  bool is_noisy_ = false;
   int tiles_x_ = 0;
   int tiles_y_ = 0;
   std::vector<std::uint8_t> darkest_, brightest_;  // per tile
@@ -60,6 +67,7 @@ class Threshold {
   void widen_tiles(int first, int last);
   void join_wide_rows(int tile_y, std::uint8_t* low, std::uint8_t* high) const;
   void join_rows();
+  int contrast_above_noise(int min_contrast) const;
   void set_limits(int tile_y, const ThresholdOptions& options, Rows& rows) const;
   void compare(const cv::Mat& grey, const ThresholdOptions& options, Rows& rows, CornerCodes& corners) const;
 };

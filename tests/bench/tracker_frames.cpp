@@ -48,6 +48,7 @@ PlacedMarker drawn_marker(const Condition& condition,
   pose = Pose(ray.toRotationMatrix() * pose.rotation_matrix(), pose.translation);
   marker.margin = condition.margin;
   marker.bow = condition.bow;
+  marker.cylinder_radius = condition.cylinder_radius;
   marker.row_motion = condition.row_motion_px / 1000 * along(any_angle(rng));
   return marker;
 }
@@ -98,7 +99,8 @@ cv::Mat background(const Condition& condition,
                    std::span<const PlacedMarker> markers,
                    bool cluttered,
                    Rng& rng) {
-  const double level = condition.black + uniform(rng, {0.1, 0.7}) * (condition.white - condition.black);
+  double level = condition.black + uniform(rng, {0.1, 0.7}) * (condition.white - condition.black);
+  if (condition.background >= 0) level = condition.background, cluttered = false;
   cv::Mat image =
       cluttered ? clutter(k_width, k_height, rng) : plain(k_width, k_height, static_cast<int>(level));
   if (cluttered) {  // in the levels of the condition
@@ -111,7 +113,8 @@ cv::Mat background(const Condition& condition,
   return image;
 }
 
-// Draws something of a medium grey over a marker's corner or edge, or paper that covers a part of the border.
+// Draws something of a medium grey over a marker's corner or edge, paper that covers a part of the border, or
+// a round spot over an edge.
 void cover(const Condition& condition,
            const Lens& lens,
            const PlacedMarker& marker,
@@ -129,6 +132,17 @@ void cover(const Condition& condition,
     const Eigen::Vector2d middle = corners[i] + at * (next - corners[i]);
     cv::circle(light, fixed(middle), static_cast<int>(std::lround(8 * width)), cv::Scalar(condition.white),
                -1, cv::LINE_AA, 4);
+    return;
+  }
+  if (condition.cover == Cover::bright_spot || condition.cover == Cover::dark_spot) {
+    const bool bright = condition.cover == Cover::bright_spot;
+    const Eigen::Vector2d outward =
+        Eigen::Vector2d(next.y() - corners[i].y(), corners[i].x() - next.x()) / side;
+    const Eigen::Vector2d edge = corners[i] + uniform(rng, {0.3, 0.7}) * (next - corners[i]);
+    const Eigen::Vector2d middle = edge + (bright ? 0.02 : 0.07) * side * outward;
+    const double level = bright ? 255 : condition.black + 0.06 * (condition.white - condition.black);
+    cv::circle(light, fixed(middle), static_cast<int>(std::lround(8 * width)), cv::Scalar(level), -1,
+               cv::LINE_AA, 4);
     return;
   }
   const bool on_corner = condition.cover == Cover::corner;
@@ -249,7 +263,10 @@ TrackerFrame frame_of(const Condition& condition, std::uint64_t seed, int number
 std::vector<std::string> tracker_frame_families() { return {"apriltag_36h11", "apriltag_25h9"}; }
 
 TrackerFrame tracker_frame(const Condition& condition, std::uint64_t seed, int number) {
-  return frame_of(condition, seed, number, benchmark_name);
+  if (condition.family.empty()) return frame_of(condition, seed, number, benchmark_name);
+  return frame_of(condition, seed, number, [&](int, Rng& rng) {
+    return MarkerName{condition.family, std::to_string(std::uniform_int_distribution<int>(0, 49)(rng))};
+  });
 }
 
 TrackerFrame tracker_frame(const Condition& condition,
@@ -303,6 +320,7 @@ std::vector<Condition> tracker_conditions() {
       {.group = "small 16-32 px", .name = "16-20 px", .side_px = {16, 20}, .tilt_deg = {0, 40}},
       {.group = "small 16-32 px", .name = "20-24 px", .side_px = {20, 24}, .tilt_deg = {0, 40}},
       {.group = "small 16-32 px", .name = "24-32 px", .side_px = {24, 32}, .tilt_deg = {0, 40}},
+      {.group = "small 12 px", .name = "12 px", .side_px = {12, 12}, .tilt_deg = {0, 30}},
       {.group = "steep", .name = "75 deg", .side_px = {120, 120}, .tilt_deg = {75, 75}},
       {.group = "steep", .name = "80 deg", .side_px = {120, 120}, .tilt_deg = {80, 80}},
       {.group = "steep", .name = "84 deg", .side_px = {120, 120}, .tilt_deg = {84, 84}},
@@ -313,8 +331,10 @@ std::vector<Condition> tracker_conditions() {
       {.group = "blur, motion", .name = "motion 8 px", .motion_px = 8},
       {.group = "blur, motion", .name = "motion 12 px", .motion_px = 12},
       {.group = "blur, motion", .name = "motion 16 px", .motion_px = 16},
+      {.group = "motion of 24 px", .name = "motion 24 px", .motion_px = 24},
       {.group = "poor light", .name = "contrast 30 levels", .black = 100, .white = 130},
       {.group = "poor light", .name = "dark, 8 to 40", .black = 8, .white = 40},
+      {.group = "dark room", .name = "dark, 8 to 40, noise of 3", .black = 8, .white = 40, .noise_levels = 3},
       {.group = "poor light", .name = "10:1 over the picture", .light = Light::gradient},
       {.group = "poor light", .name = "10:1 over 320 px", .light = Light::steep_gradient},
       {.group = "poor light", .name = "slatted shadow 4:1", .light = Light::slats},
@@ -329,6 +349,16 @@ std::vector<Condition> tracker_conditions() {
       {.group = "finger", .name = "over an edge, 25 %", .cover = Cover::edge, .cover_share = 0.25},
       {.group = "finger", .name = "edge bitten by 8 %", .cover = Cover::bite, .cover_share = 0.08},
       {.group = "finger", .name = "edge bitten by 16 %", .cover = Cover::bite, .cover_share = 0.16},
+      {.group = "spot on an edge, 4x4",
+       .name = "bright, 25 %",
+       .cover = Cover::bright_spot,
+       .cover_share = 0.25,
+       .family = "aruco_4x4_50"},
+      {.group = "spot on an edge, 4x4",
+       .name = "dark, 25 %",
+       .cover = Cover::dark_spot,
+       .cover_share = 0.25,
+       .family = "aruco_4x4_50"},
       {.group = "lens", .name = "barrel", .bent_lens = true},
       {.group = "lens",
        .name = "barrel, 120-180 px, sigma 2.5",
@@ -337,6 +367,14 @@ std::vector<Condition> tracker_conditions() {
        .bent_lens = true},
       {.group = "lens", .name = "rolling shutter, 60 px a picture", .row_motion_px = 60},
       {.group = "bent paper", .name = "bow 0.6 %", .bow = 0.006},
+      {.group = "cylinder", .name = "radius of 4 sides", .cylinder_radius = 4},
+      {.group = "cylinder", .name = "radius of 2 sides", .cylinder_radius = 2},
+      {.group = "cylinder", .name = "radius of 1 side", .cylinder_radius = 1},
+      {.group = "cylinder, 4x4 100-160 px",
+       .name = "radius of 1 side, 4x4",
+       .side_px = {100, 160},
+       .cylinder_radius = 1,
+       .family = "aruco_4x4_50"},
       {.group = "JPEG", .name = "quality 75", .jpeg_quality = 75},
       {.group = "JPEG", .name = "quality 35", .jpeg_quality = 35},
   };

@@ -13,7 +13,8 @@
 namespace limn::test {
 
 enum class Light { even, gradient, steep_gradient, slats, projected };
-enum class Cover { none, corner, edge, bite };
+/// A bright or a dark spot lies over the middle part of an edge and touches no cell of a 4x4 code.
+enum class Cover { none, corner, edge, bite, bright_spot, dark_spot };
 
 struct Range {
   double low = 0, high = 0;
@@ -31,12 +32,15 @@ struct Condition {
   double margin = 0.125;   ///< white paper around the marker, as share of its side
   bool dark_card = false;  ///< the paper lies on a dark square card, the card on light ground
   Cover cover = Cover::none;
-  double cover_share = 0;    ///< width of the covering object, as share of the side
-  double bow = 0;            ///< bent paper, as PlacedMarker::bow
-  double row_motion_px = 0;  ///< rolling shutter: motion over 1000 rows, in any direction
+  double cover_share = 0;      ///< width of the covering object, as share of the side
+  double bow = 0;              ///< bent paper, as PlacedMarker::bow
+  double cylinder_radius = 0;  ///< as PlacedMarker::cylinder_radius
+  double row_motion_px = 0;    ///< rolling shutter: motion over 1000 rows, in any direction
   bool bent_lens = false;
   int jpeg_quality = 0;  ///< 0: none
   double noise_levels = 2;
+  double background = -1;   ///< grey level beside the paper; negative: between black and white
+  std::string family = {};  ///< empty: tracker_frame_families()
 };
 
 /// The conditions of the tracker's benchmark, ordered by group.

@@ -24,20 +24,42 @@ struct MarkerPlane {
   Eigen::Matrix3d rotation;  // marker_from_camera
   Eigen::Vector3d origin;    // position of the camera, in marker coordinates
   double size_m;
-  double bow;
+  double bow, radius;
   explicit MarkerPlane(const PlacedMarker& placed)
       : rotation(placed.camera_from_marker.inverse().rotation_matrix()),
         origin(placed.camera_from_marker.inverse().translation),
         size_m(placed.size_m),
-        bow(placed.bow) {}
+        bow(placed.bow),
+        radius(placed.cylinder_radius) {}
   std::optional<Eigen::Vector2d> at(const Eigen::Vector3d& d_camera) const {
     const Eigen::Vector3d d = rotation * d_camera;
+    if (radius > 0) return on_cylinder(origin / size_m, d);
     const double distance = -origin.z() / d.z();
     if (!(distance > 0)) return std::nullopt;
     const Eigen::Vector2d p = (origin + distance * d).head<2>() / size_m + Eigen::Vector2d(0.5, 0.5);
     return Eigen::Vector2d(p.x(), p.y() - 4 * bow * p.x() * (1 - p.x()));
   }
+  // The first intersection of a ray from `from` with the cylinder around (0, y, radius), in sides.
+  std::optional<Eigen::Vector2d> on_cylinder(const Eigen::Vector3d& from, const Eigen::Vector3d& d) const {
+    const Eigen::Vector2d o(from.x(), from.z() - radius), way(d.x(), d.z());
+    const double a = way.squaredNorm(), b = o.dot(way), c = o.squaredNorm() - radius * radius;
+    const double root = b * b - a * c;
+    if (!(root >= 0)) return std::nullopt;
+    const double along = (-b - std::sqrt(root)) / a;
+    if (!(along > 0)) return std::nullopt;
+    const Eigen::Vector2d at = o + along * way;
+    const double around = radius * std::atan2(at.x(), -at.y());
+    return Eigen::Vector2d(around + 0.5, from.y() + along * d.y() + 0.5);
+  }
 };
+
+// A place on the paper in marker coordinates; x and y in sides from the marker's middle.
+Eigen::Vector3d on_paper(const PlacedMarker& placed, double x, double y) {
+  const double r = placed.cylinder_radius;
+  const Eigen::Vector3d place =
+      r > 0 ? Eigen::Vector3d(r * std::sin(x / r), y, r * (1 - std::cos(x / r))) : Eigen::Vector3d(x, y, 0);
+  return placed.size_m * place;
+}
 
 // The shear that a rolling shutter causes around a marker's centre.
 struct RowMotion {
@@ -86,12 +108,16 @@ PlacedMarker whole(PlacedMarker placed) {
 cv::Rect bounds(const Lens& lens, const PlacedMarker& placed, const cv::Size& size) {
   Eigen::Vector2d low(1e9, 1e9);
   Eigen::Vector2d high(-1e9, -1e9);
-  PlacedMarker paper = whole(placed);
-  paper.size_m *= 1 + 2 * placed.margin;
-  for (const Eigen::Vector2d& px : true_corners(lens, paper)) {
-    low = low.cwiseMin(px);
-    high = high.cwiseMax(px);
-  }
+  const PlacedMarker paper = whole(placed);
+  const RowMotion motion(lens, placed);
+  const double half = 0.5 + placed.margin;
+  for (const double y : {-half, half})
+    for (int i = -4; i <= 4; ++i) {
+      const Eigen::Vector2d px =
+          motion.seen(lens.project(placed.camera_from_marker * on_paper(paper, 0.25 * i * half, y)).value());
+      low = low.cwiseMin(px);
+      high = high.cwiseMax(px);
+    }
   // Sides may be curved in a lens's image.
   const Eigen::Vector2d bow = 0.05 * (high - low) + Eigen::Vector2d(2, 2);
   low -= bow;
@@ -195,9 +221,8 @@ int whole(std::mt19937_64& rng, int low, int high) {
 }  // namespace
 
 std::array<Eigen::Vector2d, 4> true_corners(const Lens& lens, const PlacedMarker& placed) {
-  const double h = 0.5 * placed.size_m;
-  const std::array<Eigen::Vector3d, 4> corners = {Eigen::Vector3d(-h, -h, 0), Eigen::Vector3d(h, -h, 0),
-                                                  Eigen::Vector3d(h, h, 0), Eigen::Vector3d(-h, h, 0)};
+  const std::array<Eigen::Vector3d, 4> corners = {on_paper(placed, -0.5, -0.5), on_paper(placed, 0.5, -0.5),
+                                                  on_paper(placed, 0.5, 0.5), on_paper(placed, -0.5, 0.5)};
   std::array<Eigen::Vector2d, 4> px;
   const RowMotion motion(lens, placed);
   for (std::size_t i = 0; i < 4; ++i)

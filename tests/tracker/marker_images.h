@@ -22,6 +22,9 @@ struct PlacedMarker {
   /// How far the middles of its upper and lower sides lie below their chords, as share of its side: paper
   /// around a cylinder, seen along the cylinder's axis from above. The corners do not move.
   double bow = 0;
+  /// Radius of the cylinder that the paper is wrapped around, in sides: its axis lies behind the paper, along
+  /// the marker's y. 0: flat paper. The pose is that of the plane that touches the marker's middle.
+  double cylinder_radius = 0;
   /// Rolling shutter: px by which the image moves from one row to the next; zero shift at the row of the
   /// marker's centre.
   Eigen::Vector2d row_motion = Eigen::Vector2d::Zero();
