@@ -28,12 +28,10 @@ constexpr int k_few_bits = 25;
 // Cells of one side of the border, between its corners, that may read white where something lies over that
 // side.
 constexpr int k_broken_side_errors = 3;
-// Largest probability that random cells are a code of a family that is read there.
+// Largest probability that random cells are a code of a family that is read there, and smallest mean margin
+// of the cells.
 constexpr double k_max_broken_hit = 0.007;
-// Codes with fewer changes between neighbouring cells along rows, or along columns, look like stripes and
-// edges: the mean margin of their cells must be at least this.
-constexpr int k_min_changes = 4;
-constexpr double k_min_striped_margin = 0.8;
+constexpr double k_min_broken_margin = 0.8;
 // Smallest mean margin of the cells (0: at the limit between black and white, 1: as black or white as beside
 // the edge). Clutter has less.
 constexpr double k_min_margin = 0.35;
@@ -184,24 +182,11 @@ double random_hit(const CodeFamily& family, int readable, int errors) {
   return std::min(1.0, 4 * static_cast<double>(family.codes.size()) * words / std::ldexp(1.0, readable));
 }
 
-// Whether the cells change seldom along rows or along columns: stripes and edges look like such codes.
-bool is_striped(std::uint64_t code, int cells) {
-  int along = 0, down = 0;
-  const auto is_white = [&](int row, int column) { return (code >> (row * cells + column)) & 1; };
-  for (int row = 0; row < cells; ++row)
-    for (int column = 0; column + 1 < cells; ++column) {
-      along += is_white(row, column) != is_white(row, column + 1);
-      down += is_white(column, row) != is_white(column + 1, row);
-    }
-  return std::min(along, down) < k_min_changes;
-}
-
 // Whether the cells are a code without a doubt, but for a part of one side of the border.
 bool is_clear_beside_broken_side(const CodeFamily& family, const Bits& bits) {
-  return bits.one_side_is_broken() && bits.mean_margin >= k_min_margin_few_bits &&
+  return bits.one_side_is_broken() && bits.mean_margin >= k_min_broken_margin &&
          random_hit(family, family.cells * family.cells, 0) <= k_max_broken_hit &&
-         nearest(family.codes, bits.code, ~std::uint64_t{0}).errors == 0 &&
-         (bits.mean_margin >= k_min_striped_margin || !is_striped(bits.code, family.cells));
+         nearest(family.codes, bits.code, ~std::uint64_t{0}).errors == 0;
 }
 
 bool read_code(const std::vector<CodeFamily>& families,
@@ -264,14 +249,22 @@ bool is_border_dark(const QuadReader& reader, double border) {
   return reader.light_places(places) <= k_barcode_border_errors * 8 * k_places;
 }
 
-// Whether the border is dark where a border of two cells has its inner ring, for 5 x 5 to 7 x 7 cells. Other
-// markers with so many cells have cells there.
+// Whether the border is dark where a border of two cells has its inner ring, for 5 x 5 to 7 x 7 cells (other
+// markers with so many cells have cells there), and no light ring divides it, as the white margin of a marker
+// on a dark card does.
 bool has_wide_border(const QuadReader& reader) {
   constexpr int k_places = 6;  // places along a side
   constexpr double k_inset = 0.15;
   Places places;
   places.add_ring(k_inset, k_places);
-  return reader.light_places(places) <= 2;
+  if (reader.light_places(places) > 2) return false;
+  constexpr int k_few_places = 3, k_rings = 8;
+  for (int ring = 0; ring < k_rings; ++ring) {
+    Places around;
+    around.add_ring(0.03 + 0.02 * ring, k_few_places);
+    if (reader.light_places(around) > 2 * k_few_places) return false;
+  }
+  return true;
 }
 
 Bits barcode_bits(const QuadReader& reader, const CodeFamily& family) {
@@ -417,7 +410,7 @@ bool has_light_surroundings(const QuadReader& reader) {
     places.add(along, 1 + k_surroundings);
     places.add(-k_surroundings, along);
   }
-  return reader.light_places(places) >= 4 * k_places * 3 / 4;
+  return reader.light_places(places) >= 4 * k_places * 7 / 8;
 }
 
 std::optional<Identity> read(const QuadReader& reader,

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "tracker/identify.h"
@@ -84,6 +85,18 @@ CoarseCells coarse_cells(const cv::Mat& grey, const Quad& quad, int count) {
   for (std::size_t i = 0; i < side * side; ++i)
     if (!is_border(i)) cells.code = (cells.code << 1) | std::uint64_t{levels[i] > middle};
   return cells;
+}
+
+// Whether the sides are as different as those of a square that is tilted by 53 degrees, or more. Parts of
+// other markers are.
+bool is_elongated(const Quad& quad) {
+  constexpr double k_most_ratio = 1 / 0.6;
+  double shortest = std::numeric_limits<double>::infinity(), longest = 0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double side = (quad.corners_px[(i + 1) % 4] - quad.corners_px[i]).norm();
+    shortest = std::min(shortest, side), longest = std::max(longest, side);
+  }
+  return longest > k_most_ratio * shortest;
 }
 
 }  // namespace
@@ -169,6 +182,7 @@ bool may_be_covered_code(const cv::Mat& grey, const Quad& quad) {
 
 bool may_be_code_with_broken_side(const cv::Mat& grey, const Quad& quad, const Families& families) {
   constexpr int k_most_wrong = 2;
+  if (is_elongated(quad)) return false;
   CoarseCells cells;
   return std::ranges::any_of(families.codes(), [&](const CodeFamily& family) {
     if (!can_have_broken_side(family) || family.cells + 2 > k_most_coarse_side) return false;

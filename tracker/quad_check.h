@@ -19,7 +19,7 @@ bool may_be_marker(const cv::Mat& grey, const Quad& quad, double min_contrast, d
 bool may_be_covered_code(const cv::Mat& grey, const Quad& quad);
 
 /// Whether the nearest pixels show a code that can_have_broken_side(), but for two cells, and a border that
-/// is dark, but for four. Costs as much as may_be_covered_code.
+/// is dark, but for four, in a square that is not steep. Costs as much as may_be_covered_code.
 bool may_be_code_with_broken_side(const cv::Mat& grey, const Quad& quad, const Families& families);
 
 }  // namespace limn::tracker

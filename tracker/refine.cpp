@@ -54,6 +54,7 @@ constexpr double k_no_bow_factor = 1.5;
 // Shorter sides show too little of it.
 constexpr double k_min_curve_bow_share = 0.02, k_max_curve_bow_share = 0.22;
 constexpr std::size_t k_min_curve_crossings = 24;
+constexpr double k_sharp_half = 12;  // half a side, in its blur: other edges bend more blurred sides
 // Standard deviation of the terms of third and fourth order, at half a side: a share of the bow; less where
 // the bow is a smaller share of half the side than this.
 constexpr double k_curve_share = 0.1, k_curved_bow_share = 0.06;
@@ -765,7 +766,9 @@ double common_bow(const EdgeRefiner::EdgeLine& a, const EdgeRefiner::EdgeLine& b
 void begin_curves(std::array<EdgeRefiner::EdgeLine, 4>* lines) {
   for (std::size_t i = 0; i < 4; ++i) {
     EdgeRefiner::EdgeLine &line = (*lines)[i], &opposite = (*lines)[(i + 2) % 4];
-    line.is_curved = std::max(bow_across(line).norm(), bow_across(opposite).norm()) > k_min_curve_bow_share;
+    line.is_curved =
+        std::max(bow_across(line).norm(), bow_across(opposite).norm()) > k_min_curve_bow_share &&
+        std::min(line.half, opposite.half) > k_sharp_half * std::max(line.blur_px, opposite.blur_px);
     if (!line.is_curved || line.bent_terms.isZero()) continue;
     line.offset = line.bent_terms[0], line.slope = line.bent_terms[1], line.curvature = line.bent_terms[2];
   }
@@ -834,7 +837,8 @@ std::optional<RefinedQuad> EdgeRefiner::refine(const cv::Mat& grey,
     refined.corners_px = corners;
     refined.bow_share = 0;
     for (std::size_t i = 0; i < 2; ++i)
-      refined.bow_share = std::max(refined.bow_share, common_bow(lines[i], lines[i + 2]));
+      if (lines[i].is_curved)
+        refined.bow_share = std::max(refined.bow_share, common_bow(lines[i], lines[i + 2]));
     refined.separate = std::all_of(lines.begin(), lines.end(), [](const EdgeLine& l) { return l.separate; });
     if (!is_convex(corners)) return std::nullopt;
     const bool is_curved =

@@ -100,6 +100,29 @@ TEST(MarkerKinds, BordersOfTwoCellsAreRead) {
   EXPECT_EQ(detected({"aruco_4x4_1000", "aruco_5x5_1000", "aruco_6x6_1000"}, image).size(), 0u);
 }
 
+// The marker with a narrow white margin on a dark card that is `card` cells wide around it.
+PlacedMarker on_dark_card(PlacedMarker marker, double card) {
+  constexpr int k_cell = 25, k_margin = 8;
+  const int wide = static_cast<int>(card * k_cell);
+  const cv::Mat cells = draw_marker(marker.marker, 1).value();
+  cv::resize(cells, marker.cells, {}, k_cell, k_cell, cv::INTER_NEAREST);
+  cv::copyMakeBorder(marker.cells, marker.cells, k_margin, k_margin, k_margin, k_margin, cv::BORDER_CONSTANT,
+                     cv::Scalar(255));
+  cv::copyMakeBorder(marker.cells, marker.cells, wide, wide, wide, wide, cv::BORDER_CONSTANT, cv::Scalar(0));
+  marker.size_m *= static_cast<double>(marker.cells.cols) / (k_cell * cells.cols);
+  return marker;
+}
+
+TEST(MarkerKinds, ADarkCardIsNoBorder) {
+  auto rng = test::test_rng();
+  for (int i = 0; i < 24; ++i) {
+    const PlacedMarker marker = placed({"apriltag_36h11", std::to_string(i)}, 320, 240, uniform(rng, 50, 120),
+                                       uniform(rng, 0, 6.28), uniform(rng, 0, 0.8));
+    const cv::Mat image = picture({on_dark_card(marker, uniform(rng, 0.5, 1.2))}, 160, rng);
+    expect_found(detected({"apriltag_36h11"}, image), {marker});
+  }
+}
+
 // A part of Kalibr's AprilGrid: squares between the tags touch the tags' corners.
 TEST(MarkerKinds, TagsOfAnAprilGridAreRead) {
   auto rng = test::test_rng();
