@@ -19,6 +19,7 @@
 #include "tracker/body_estimate.h"
 #include "tracker/detector.h"
 #include "tracker/marker_image.h"
+#include "validate/light_chain.h"
 #include "validate/metrics.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/virtual_capture.h"
@@ -29,8 +30,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int k_judged_points = 2500;
-constexpr std::uint64_t k_judged_seed = 20261121;
 constexpr int k_viewer_width = 1280, k_viewer_height = 960;
 constexpr double k_viewer_fov_deg = 40;
 
@@ -89,7 +88,8 @@ struct DemoSession {
 struct Moment {
   cv::Mat photograph;  // the room without projected light
   int markers = 0;
-  int false_markers = 0;  // detected markers that are not in the room
+  int false_markers = 0;                       // detected markers that are not in the room
+  std::vector<tracker::Detection> detections;  // in camera 0
   std::vector<Track> tracks;
   scene::PosedScene posed;
 };
@@ -114,7 +114,8 @@ Result<Moment> track_moment(DemoSession* session,
   LIMN_TRY(const Frame frame, room->camera(0).next());
   moment.photograph = frame.image;
   const Imager& camera = session->rig.cameras.at(0);
-  const auto detections = session->detector.detect(to_grey(frame.image), &camera.lens);
+  moment.detections = session->detector.detect(to_grey(frame.image), &camera.lens);
+  const auto& detections = moment.detections;
   moment.markers = static_cast<int>(detections.size());
   moment.false_markers =
       static_cast<int>(std::count_if(detections.begin(), detections.end(), [&](const auto& detection) {
@@ -156,33 +157,6 @@ cv::Mat photographed_from(const sim::World& world, const Imager& viewer, const s
   sim::World world_of_viewer = world;
   world_of_viewer.rig.cameras = {viewer};
   return sim::photograph(world_of_viewer, sim::trace(world_of_viewer, 0), images, world.seed);
-}
-
-// A renderer of the target dots instead of the scene's parts, on the same prototype.
-Result<projector::Renderer> dots_renderer(const DemoSession& session, const TargetDots& dots) {
-  scene::Scene scene = session.scene;
-  scene::Slot slot;
-  slot.name = "dots";
-  slot.mode = scene::Mode::surface;
-  slot.variants = {{"dots", dots.mesh}};
-  scene.slots = {slot};
-  return projector::Renderer::create(scene, session.rig);
-}
-
-struct JudgedDots {
-  TargetDots dots;
-  Registration registration;
-};
-
-// Compares the light of the calibrated rig with the ground truth, with the door where the tracker says it is.
-Result<JudgedDots> judge(const DemoSession& session, const sim::World& world, const Moment& moment) {
-  const TargetDots dots = target_dots(world, k_judged_points, k_judged_seed);
-  LIMN_TRY(projector::Renderer renderer, dots_renderer(session, dots));
-  const Pose& world_from_prototype = *moment.posed.world_from_prototype;
-  const scene::PosedScene posed{world_from_prototype, {{"dots", "dots", world_from_prototype}}};
-  const auto images =
-      drawn(&renderer, session.rig.projectors.size(), posed, designer_viewer(world_from_prototype));
-  return JudgedDots{dots, judged_registration(world, dots, images)};
 }
 
 // The masks of all parts in one image; where they overlap, the later slot's.
@@ -235,6 +209,7 @@ struct Place {
   std::string name;  // key in demo.json
   Moment moment;
   JudgedDots judged;
+  LightChain chain;
 };
 
 Result<Place> judge_place(const std::string& name,
@@ -244,9 +219,14 @@ Result<Place> judge_place(const std::string& name,
                           PhaseTimes* phases) {
   room->move("prototype", world_from_prototype);
   LIMN_TRY(Moment moment, phases->time("track", [&] { return track_moment(session, room, {}); }));
-  LIMN_TRY(JudgedDots judged_dots,
-           phases->time("judge", [&] { return judge(*session, room->world(), moment); }));
-  return Place{name, std::move(moment), std::move(judged_dots)};
+  const sim::World& world = room->world();
+  LIMN_TRY(JudgedDots judged, phases->time("judge", [&] {
+    return judge_light(session->scene, session->rig, world, *moment.posed.world_from_prototype);
+  }));
+  LIMN_TRY(const LightChain chain, phases->time("judge", [&] {
+    return light_chain(session->scene, session->rig, world, session->bodies, moment.detections);
+  }));
+  return Place{name, std::move(moment), std::move(judged), chain};
 }
 
 // The door in place, moved by 150 mm, and turned by 40°.
@@ -317,6 +297,11 @@ std::vector<DemoRow> rows_of(const DemoMeasurement& measured) {
             found.rms_mm, "mm", k_max_registration_mm);
     rows.push_back({fmt::format("registration {}, 95 % quantile", readable(place.name)),
                     fmt::format("{:.3f} mm", found.p95_mm), "", true});
+    rows.push_back({fmt::format("registration {}, made of", readable(place.name)),
+                    fmt::format("calibration {:.3f}, marker corners {:.3f}, pose {:.3f}, rendering {:.3f} mm",
+                                place.chain.calibration_mm, place.chain.marker_corners_mm,
+                                place.chain.prototype_pose_mm, place.chain.rendering_mm),
+                    "", true});
   }
   int markers = 0, false_markers = 0;
   for (const Place& place : measured.places) {
@@ -343,6 +328,10 @@ nlohmann::ordered_json json_of(const DemoMeasurement& measured) {
     const Registration& found = place.judged.registration;
     json["registration_mm"][place.name] = {
         {"rms", found.rms_mm}, {"p95", found.p95_mm}, {"points", found.points}, {"unlit", found.unlit}};
+    json["chain_mm"][place.name] = {{"calibration", place.chain.calibration_mm},
+                                    {"marker_corners", place.chain.marker_corners_mm},
+                                    {"prototype_pose", place.chain.prototype_pose_mm},
+                                    {"rendering", place.chain.rendering_mm}};
     json["markers"][place.name] = {{"found", place.moment.markers}, {"false", place.moment.false_markers}};
   }
   json["composite_px"] = measured.composite_px;

@@ -25,6 +25,11 @@ TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
     EXPECT_LE(registration.at("rms"), 0.25) << place << ": 0.5 is asked for, 0.11 was measured";
     EXPECT_LE(registration.at("p95"), 0.4) << place;
     EXPECT_GE(registration.at("points"), 2000) << place;
+    const auto& chain = json.at("chain_mm").at(place);
+    for (const char* stage : {"calibration", "marker_corners", "prototype_pose", "rendering"}) {
+      EXPECT_GT(chain.at(stage), 0.02) << stage << ": a raster of 1 mm pixels is not better";
+      EXPECT_LE(chain.at(stage), 0.2) << stage;
+    }
     EXPECT_GE(json.at("markers").at(place).at("found"), 5) << place;
     EXPECT_EQ(json.at("markers").at(place).at("false"), 0) << place;
   }
