@@ -180,12 +180,14 @@ Error no_triangles(const fs::path& path) {
   return error("{}: expected triangles, found none. Export the mesh with its faces.", path.string());
 }
 
-// Sets broken normals to zero; true: a normal has to be computed.
+// Gives the file's normals unit length and sets broken ones to zero; true: a normal has to be computed.
 bool has_missing_normals(Soup* soup) {
   bool is_missing = false;
   for (Corner& corner : soup->corners) {
-    if (!corner.normal.allFinite()) corner.normal.setZero();
-    is_missing |= corner.normal.squaredNorm() < 0.25f;
+    Eigen::Vector3f& n = corner.normal;
+    if (!n.allFinite() || n.squaredNorm() < 0.25F) n.setZero();
+    if (std::abs(n.squaredNorm() - 1) > 1e-5F) n.stableNormalize();
+    is_missing |= n.isZero();
   }
   return is_missing;
 }
