@@ -27,9 +27,10 @@ struct Header {
   std::size_t palette_entry() const { return size == k_core_header ? 3 : 4; }
   std::size_t palette_size() const { return colours > 0 ? std::min(colours, 256u) : std::size_t{1} << bits; }
   std::size_t row_bytes() const { return (static_cast<std::size_t>(width) * bits + 31) / 32 * 4; }
+  // Headers of newer versions hold the masks; behind older ones they follow.
   std::size_t masks_end() const {
-    const std::size_t behind = compression == fields ? 12 : compression == alpha_fields ? 16 : 0;
-    return k_file_header + (size == k_info_header ? size + behind : size);
+    const std::size_t masks = compression == fields ? 12 : compression == alpha_fields ? 16 : 0;
+    return k_file_header + (masks > 0 ? std::max(size, k_info_header + masks) : size);
   }
 };
 

@@ -143,6 +143,7 @@ class MaterialReader {
       : source_(source), place_(texture_place(source)), name_(std::move(name)), images_(*images) {}
 
   Result<Material> read() {
+    LIMN_TRY_STATUS(check_numbers());
     Material material;
     material.base_colour = source_.base_colour;
     material.unlit = source_.unlit;
@@ -154,6 +155,18 @@ class MaterialReader {
   }
 
  private:
+  Status check_numbers() const {
+    const MaterialSource& s = source_;
+    const bool is_finite = s.base_colour.allFinite() && s.emitted.allFinite() && std::isfinite(s.alpha) &&
+                           std::isfinite(s.metallic) && std::isfinite(s.roughness) &&
+                           std::isfinite(s.normal_scale) && std::isfinite(s.occlusion_strength);
+    if (is_finite) return {};
+    return error(
+        "{}: expected finite numbers for its colours and factors, found NaN or infinity. Repair or "
+        "export the mesh again.",
+        name_);
+  }
+
   Status read_base_texture(Material* material) {
     const float below = source_.cut_below, alpha = source_.alpha;
     const float texture_below = below > 0 ? below / std::max(alpha, 1e-6F) : 0;

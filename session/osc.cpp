@@ -56,9 +56,9 @@ bool is_printable(const std::string& text) {
   return is_utf8(text) && std::none_of(text.begin(), text.end(), is_control);
 }
 
-// The text as it may appear in a message to people.
+// The text as it may appear in a message to people. A character that is cut off becomes U+FFFD.
 std::string printable(const std::string& text) {
-  return is_printable(text) ? text.substr(0, k_longest_text) : "?";
+  return is_printable(text) ? as_utf8(text.substr(0, k_longest_text)) : "?";
 }
 
 // Reads the padded text that begins at `at`; nullopt: it has no end.

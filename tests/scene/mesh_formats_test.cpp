@@ -117,6 +117,23 @@ TEST(ObjMesh, FacesMayComeFirstOrNameNormalsThatAreNotThere) {
   EXPECT_NEAR(plate.mesh.normals.at(0).z(), 1, 1e-6);
 }
 
+TEST(ObjMesh, NormalsOfAnyLengthBecomeUnitNormals) {
+  const Loaded plate = loaded(
+      written("long.obj", std::string(k_plate) + "vn 0 3 4\nvn 0 3e30 4e30\nvn 0 .6 .8\nf 1//1 2//2 3//3\n"));
+  ASSERT_EQ(plate.mesh.normals.size(), 3U);
+  for (const Vector3f& normal : plate.mesh.normals)
+    EXPECT_TRUE(test::near(normal.cast<double>(), Vector3d(0, 0.6, 0.8), 1e-6));
+}
+
+TEST(ObjMesh, AColourThatIsNoFiniteNumberIsAnError) {
+  for (const char* value : {"nan", "1e300"}) {
+    written("bright.mtl", std::string("newmtl bright\nKd 0.5 0.5 ") + value + "\n");
+    const std::string message = error_of(
+        written("bright.obj", std::string("mtllib bright.mtl\n") + k_plate + "usemtl bright\nf 1 2 3\n"));
+    EXPECT_TRUE(contains(message, "bright.obj: material 'bright': expected finite numbers"));
+  }
+}
+
 TEST(ObjMesh, AConcavePolygonIsCutAlongItsInside) {
   const Loaded l = loaded(
       written("l.obj", "v 0 0 0\nv 100 0 0\nv 100 30 0\nv 30 30 0\nv 30 80 0\nv 0 80 0\nf 1 2 3 4 5 6\n"));
