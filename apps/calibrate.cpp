@@ -74,7 +74,7 @@ std::string to_json(const wizard::Calibrated& done) {
 
 void say_end(const CalibrateOptions& options, const wizard::Calibrated& done, const Say& say) {
   for (const calib::Fault& fault : done.report.assessment.faults)
-    say(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
+    say("fault " + calib::to_text(fault));
   for (const std::string& sentence : done.report.explanation.advice) say("advice: " + sentence);
   std::vector<std::string> times;
   for (const auto& [projector, seconds] : done.capture_s)

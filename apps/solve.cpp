@@ -37,8 +37,7 @@ void print_report(const calib::Report& report) {
                 check.known.from, check.known.to, 1e3 * check.known.length_m, 1e3 * check.measured_m,
                 1e3 * check.stddev_m);
   }
-  for (const calib::Fault& fault : assessment.faults)
-    print_out("fault {}: {}; {}.\n", calib::to_text(fault.name), fault.evidence, fault.advice);
+  for (const calib::Fault& fault : assessment.faults) print_out("fault {}\n", calib::to_text(fault));
   for (const std::string& sentence : report.explanation.advice) print_out("advice: {}\n", sentence);
   print_out("held-out {:.3f} px RMS, worst {:.3f} px{}\n{}\n", assessment.held_out.rms_px,
             assessment.held_out.worst_px,

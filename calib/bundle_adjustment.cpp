@@ -58,10 +58,10 @@ BundleAdjuster::BundleAdjuster(const Observations& observations, const SolveOpti
       shape_{observations.board.width_m(), observations.board.height_m()},
       match_rays_(observations.matches.size()),
       point_rays_(observations.points.size()) {
-  index_parameters();
+  group_observations();
 }
 
-void BundleAdjuster::index_parameters() {
+void BundleAdjuster::group_observations() {
   std::map<std::tuple<int, int, int>, Group> groups;  // pose, projector, camera
   const auto assign = [&](int pose, int projector, int camera, size_t member) {
     if (pose == left_out_) return;
@@ -116,14 +116,14 @@ void BundleAdjuster::add_group(const Group& group,
       const Match& match = observations_.matches[group.members[i]];
       LensRay& ray = match_rays_[group.members[i]];
       measured = match.px_projector;
-      stddev = std::hypot(match.stddev_px, noise.match_px);
+      stddev = noise.match.total(match.stddev_px);
       seen = find_ray(camera.lens.model, camera.lens.values, match.px_camera, true, &ray) &&
              predict_match(camera_view, view(*projector), *board, shape_, at.bend_m, ray, &px, &d);
     } else {
       const CornerObservation& corner = observations_.corners[group.members[i]];
       const Vector2d p_board = observations_.board.p_corner(corner.corner).head<2>();
       measured = corner.px;
-      stddev = std::hypot(corner.stddev_px, noise.corner_px);
+      stddev = noise.corner.total(corner.stddev_px);
       seen = predict_corner(camera_view, *board, shape_, at.bend_m, p_board, &px, &d);
     }
     if (!seen) {
@@ -204,7 +204,7 @@ void BundleAdjuster::add_points(const Parameters& at, const Noise& noise, Normal
         robust_weight(k_unseen * k_unseen, normal);
         continue;
       }
-      const double stddev = std::hypot(tie_observation.stddev_px, noise.tie_point_px);
+      const double stddev = noise.tie_point.total(tie_observation.stddev_px);
       const Vector2d residual = (px - tie_observation.px) / stddev;
       const double scale = std::sqrt(robust_weight(residual.squaredNorm(), normal)), factor = scale / stddev;
       const auto row = static_cast<Eigen::Index>(2 * (k - begin));
@@ -422,24 +422,28 @@ struct BundleAdjuster::Problem {
   }
 };
 
-Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
-                                                         const Noise& noise,
-                                                         double enough) {
+void BundleAdjuster::index_parameters(const Parameters& of) {
   camera_at_.clear();
   projector_at_.clear();
   int size = 0;
-  for (const Imager& camera : start.cameras) {
+  for (const Imager& camera : of.cameras) {
     camera_at_.push_back(size);
     size += value_count(camera) + 6;
   }
-  for (const Imager& projector : start.projectors) {
+  for (const Imager& projector : of.projectors) {
     projector_at_.push_back(size);
     size += value_count(projector) + 6;
   }
   bend_at_ = size;
   free_.assign(static_cast<size_t>(size) + 2, true);
-  for (int i = 0; i < 6; ++i) free_[static_cast<size_t>(value_count(start.cameras[0]) + i)] = false;
+  for (int i = 0; i < 6; ++i) free_[static_cast<size_t>(value_count(of.cameras[0]) + i)] = false;
   if (!options_.bend) free_[static_cast<size_t>(size)] = free_[static_cast<size_t>(size) + 1] = false;
+}
+
+Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
+                                                         const Noise& noise,
+                                                         double enough) {
+  index_parameters(start);
   if (start.inverse_depths.size() != observations_.points.size()) place_points(&start);
 
   NormalEquations at_start = evaluate(start, noise);
@@ -469,7 +473,9 @@ Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
       found.steps);
 }
 
-MatrixXd BundleAdjuster::covariance(const Parameters& at, const Noise& noise) {
+MatrixXd BundleAdjuster::covariance(Parameters at, const Noise& noise) {
+  index_parameters(at);
+  if (at.inverse_depths.size() != observations_.points.size()) place_points(&at);
   const NormalEquations normal = evaluate(at, noise);
   VectorXd gradient;
   MatrixXd schur = reduced(normal, 0, &gradient);
@@ -512,7 +518,7 @@ struct BundleAdjuster::BoardProblem {
     for (const CornerObservation& corner : joint.observations_.corners) {
       if (corner.pose != pose) continue;
       const Imager& camera = at.cameras[static_cast<size_t>(corner.camera)];
-      const double stddev = std::hypot(corner.stddev_px, noise.corner_px);
+      const double stddev = noise.corner.total(corner.stddev_px);
       Vector2d px;
       if (!predict_corner(view(camera), world_from_board, joint.shape_, at.bend_m,
                           joint.observations_.board.p_corner(corner.corner).head<2>(), &px, &d)) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/measurement_model.h"
+#include "calib/noise.h"
 #include "calib/observations.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -21,13 +22,6 @@ struct Parameters {
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
   /// Inverse depths of the tie points, along z of their camera's rays, 1/m; 0: the point is not used.
   std::vector<double> inverse_depths;
-};
-
-/// Standard deviation of one coordinate in addition to each observation's own, px.
-struct Noise {
-  double corner_px = 0.2;
-  double match_px = 0.2;
-  double tie_point_px = 0.2;
 };
 
 /// The least-squares problem over all observations and its minimisation by Levenberg-Marquardt (Nocedal and
@@ -58,7 +52,7 @@ class BundleAdjuster {
   /// everything else marginalised. The effect of the robust weights is accounted for (Huber, Robust
   /// Statistics, section 7.6: by the mean of the loss's curvature and of its squared slope, estimated from
   /// the residuals).
-  Eigen::MatrixXd covariance(const Parameters& at, const Noise& noise);
+  Eigen::MatrixXd covariance(Parameters at, const Noise& noise);
 
   /// Pose of one placement of the board from its corners alone, everything else fixed.
   Result<Pose> board_pose(const Parameters& at, int pose, const Noise& noise, const Pose& start) const;
@@ -89,7 +83,8 @@ class BundleAdjuster {
   struct Problem;       // what minimise() works on: all of it,
   struct BoardProblem;  // or one placement of the board
 
-  void index_parameters();
+  void group_observations();
+  void index_parameters(const Parameters& of);
   NormalEquations evaluate(const Parameters& at, const Noise& noise);
   void add_group(const Group& group, const Parameters& at, const Noise& noise, NormalEquations* normal);
   void add_points(const Parameters& at, const Noise& noise, NormalEquations* normal);

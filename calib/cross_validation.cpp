@@ -7,12 +7,15 @@
 #include <set>
 
 #include "calib/measurement_model.h"
+#include "core/median.h"
 #include "core/parallel.h"
 
 namespace limn::calib {
 namespace {
 
 using Eigen::Vector2d;
+
+constexpr double k_odd_pose = 2.5;  // held-out RMS of a pose divided by the median of the others
 
 std::vector<int> scored_poses(const Observations& observations, const Solution& solution) {
   std::set<int> poses;
@@ -143,6 +146,23 @@ std::vector<PoseScore> score_poses(const Observations& observations,
 }
 
 }  // namespace
+
+std::vector<OddPose> odd_poses(const CrossValidation& score) {
+  std::vector<OddPose> odd;
+  for (size_t i = 0; i < score.poses.size(); ++i) {
+    std::vector<double> others;
+    for (size_t k = 0; k < score.poses.size(); ++k) {
+      if (k != i) others.push_back(score.poses[k].rms_px);
+    }
+    if (others.size() < 3) continue;
+    const double others_px = median(others);
+    if (score.poses[i].rms_px >= k_odd_pose * others_px) odd.push_back({i, others_px});
+  }
+  std::stable_sort(odd.begin(), odd.end(), [&](const OddPose& a, const OddPose& b) {
+    return score.poses[a.index].rms_px > score.poses[b.index].rms_px;
+  });
+  return odd;
+}
 
 Result<CrossValidation> cross_validate(const Observations& observations,
                                        const SolveOptions& options,

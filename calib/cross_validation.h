@@ -38,4 +38,13 @@ Result<CrossValidation> cross_validate(const Observations& observations,
                                        const Solution& solution,
                                        bool with_errors = true);
 
+/// A pose whose held-out RMS is more than 2.5 times the median of the others' (`others_px`). `index`: in
+/// CrossValidation::poses.
+struct OddPose {
+  size_t index = 0;
+  double others_px = 0;
+};
+/// The largest first; none among fewer than four poses.
+std::vector<OddPose> odd_poses(const CrossValidation& score);
+
 }  // namespace limn::calib

@@ -1,5 +1,6 @@
 #include "calib/model_selection.h"
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -17,6 +18,19 @@ constexpr const char* k_richer[] = {"LENSMODEL_OPENCV5", "LENSMODEL_OPENCV8"};
 
 // Share of the error; by chance, lenses that need no more values gain 1 or 2 %.
 constexpr double k_least_gain = 0.03;
+
+// Chi-square of four values, 95 %: distortion beyond it is no chance.
+constexpr double k_distorted = 9.49;
+
+// Whether a projector's distortion differs from 0 by more than its covariance explains.
+bool is_distorted(const Solution& solution, size_t projector) {
+  const std::vector<double>& values = solution.rig.projectors[projector].lens.values;
+  const auto count = static_cast<Eigen::Index>(values.size()) - 4;
+  const Eigen::Index at = solution.projector_at(projector) + 4;
+  const Eigen::VectorXd distortion = Eigen::Map<const Eigen::VectorXd>(values.data() + 4, count);
+  return distortion.dot(solution.covariance.block(at, at, count, count).ldlt().solve(distortion)) >
+         k_distorted;
+}
 
 struct Candidate {
   std::vector<std::string> models;
@@ -59,7 +73,7 @@ Gain gain_of(const CrossValidation& simple, const CrossValidation& rich) {
 class ModelSelector {
  public:
   ModelSelector(const Observations& observations, const SolveOptions& options, Candidate first)
-      : observations_(observations), options_(options), best_(std::move(first)) {}
+      : observations_(observations), options_(options), first_(first.solution), best_(std::move(first)) {}
 
   void choose(size_t device) {
     const bool is_projector = device >= observations_.cameras.size();
@@ -92,7 +106,8 @@ class ModelSelector {
     auto tried = candidate(device, k_pinhole);
     const Gain gain = tried ? gain_of(tried->held_out, best_.held_out) : Gain();
     note(device, k_pinhole, tried ? tried->held_out.rms_px : std::nan(""), gain);
-    if (!tried || gain.is_certain()) return false;
+    const size_t projector = device - observations_.cameras.size();
+    if (!tried || gain.is_certain() || is_distorted(first_, projector)) return false;
     best_ = *std::move(tried);
     return true;
   }
@@ -117,6 +132,7 @@ class ModelSelector {
 
   const Observations& observations_;
   const SolveOptions& options_;
+  Solution first_;  // with plain distortion for every device, and with covariance
   Candidate best_;
   std::vector<ModelTrial> trials_;
 };

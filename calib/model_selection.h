@@ -36,7 +36,8 @@ extern const char* const k_auto_lens;
 /// Solves, and selects the lens model of each device whose model is `auto`: LENSMODEL_PINHOLE (projectors
 /// only), OPENCV4, OPENCV5 or OPENCV8, by held-out error. The search is greedy, one device after another,
 /// starting from OPENCV4. A richer model is chosen only when its held-out error is lower by more than chance
-/// explains (Student's t over the poses' differences); otherwise the simpler one is. The returned held-out
+/// explains (Student's t over the poses' differences); otherwise the simpler one is. A projector's distortion
+/// is left out only if it is within what its covariance explains, too. The returned held-out
 /// error is that of the poses that were used for the selection, so it is slightly too low, but by less than
 /// the stated uncertainties.
 Result<ModelSelection> solve_selecting_models(const Observations& observations,

@@ -15,44 +15,84 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double k_outlier_at = 4;  // standard deviations: one in 3000 of correct observations
-constexpr double k_least_noise_px = 0.01;
+// Lower limits of the estimated noise: perfect observations would have infinite weights.
+constexpr double k_least_noise_px = 0.005, k_least_scale = 0.25;
+constexpr double k_rayleigh_median = 1.1774;  // of the length of a residual, standard deviations
+// Distortion that projectors' lenses may have although none was found.
+constexpr double k_pinhole_radial = 0.1, k_pinhole_tangential = 0.002;
 constexpr int k_rounds = 3;  // the noise is known only after a fit; it sets the next fit's weights
 
 ImagerView view(const Imager& imager) {
   return {imager.lens.model, imager.lens.values, imager.imager_from_world};
 }
 
-// Standard deviation of one coordinate by the median of |residual| (of a 2-D normal: 1.1774 sigma).
-double median_noise(std::vector<double> deviations, double otherwise) {
+// An observation's deviation, scaled so that its median is the standard deviation of one coordinate, and the
+// standard deviation that it states.
+struct Deviation {
+  double px = 0, stated_px = 0;
+};
+
+// The level at which the median deviation is as large as stated.
+NoiseLevel level_of(const std::vector<Deviation>& deviations, const NoiseLevel& otherwise) {
   if (deviations.empty()) return otherwise;
-  return std::max(median(std::move(deviations)), k_least_noise_px);
+  const auto median_at = [&](const NoiseLevel& level) {
+    std::vector<double> ratios;
+    for (const Deviation& d : deviations) ratios.push_back(d.px / level.total(d.stated_px));
+    return median(std::move(ratios));
+  };
+  NoiseLevel level{k_least_noise_px, 1};
+  if (const double ratio = median_at(level); ratio < 1) {
+    level.scale = std::max(ratio, k_least_scale);
+    return level;
+  }
+  double high = 1e3;
+  constexpr int k_halvings = 50;
+  for (int i = 0; i < k_halvings; ++i) {  // of the logarithm
+    const double middle = std::sqrt(level.common_px * high);
+    (median_at({middle, 1}) > 1 ? level.common_px : high) = middle;
+  }
+  return level;
 }
 
-double noise_of(const std::vector<Vector2d>& residuals) {
-  std::vector<double> deviations;
-  for (const Vector2d& r : residuals) {
-    if (r.allFinite()) deviations.push_back(r.norm() / 1.1774);  // Rayleigh's median
+template <class Seen>
+NoiseLevel level_of(const std::vector<Seen>& observations,
+                    const std::vector<Vector2d>& residuals,
+                    const NoiseLevel& otherwise) {
+  std::vector<Deviation> deviations;
+  for (size_t i = 0; i < residuals.size(); ++i) {
+    if (residuals[i].allFinite())
+      deviations.push_back({residuals[i].norm() / k_rayleigh_median, observations[i].stddev_px});
   }
-  return median_noise(std::move(deviations), Noise().corner_px);
+  return level_of(deviations, otherwise);
+}
+
+std::vector<Deviation> without_stated(const std::vector<Vector2d>& residuals) {
+  std::vector<Deviation> deviations;
+  for (const Vector2d& r : residuals) {
+    if (r.allFinite()) deviations.push_back({r.norm() / k_rayleigh_median, 0});
+  }
+  return deviations;
 }
 
 // The tie point's own depth uses one degree of freedom of its observations; the median of the remaining sum
 // of squares is Wilson's and Hilferty's.
-double tie_point_noise(const Observations& observations, const std::vector<Vector2d>& residuals) {
-  std::vector<double> deviations;
+NoiseLevel tie_point_level(const Observations& observations, const std::vector<Vector2d>& residuals) {
+  std::vector<Deviation> deviations;
   for (size_t i = 0; i < residuals.size();) {
     const int point = observations.tie_observations[i].point;
-    double squares = 0;
+    double squares = 0, stated = 0;
     int degrees = -1;
     for (; i < residuals.size() && observations.tie_observations[i].point == point; ++i) {
       if (!residuals[i].allFinite()) continue;
       squares += residuals[i].squaredNorm();
+      stated += 2 * std::pow(observations.tie_observations[i].stddev_px, 2);
       degrees += 2;
     }
     if (degrees < 1) continue;
-    deviations.push_back(std::sqrt(squares / degrees / std::pow(1 - 2.0 / (9 * degrees), 3)));
+    deviations.push_back({std::sqrt(squares / degrees / std::pow(1 - 2.0 / (9 * degrees), 3)),
+                          std::sqrt(stated / (degrees + 1))});
   }
-  return median_noise(std::move(deviations), Noise().tie_point_px);
+  return level_of(deviations, {});
 }
 
 Solution solution_at(const Parameters& parameters, const Noise& noise, int steps) {
@@ -61,15 +101,9 @@ Solution solution_at(const Parameters& parameters, const Noise& noise, int steps
   solution.rig.projectors = parameters.projectors;
   solution.world_from_board = parameters.world_from_board;
   solution.bend_m = parameters.bend_m;
-  solution.corner_noise_px = noise.corner_px;
-  solution.match_noise_px = noise.match_px;
-  solution.tie_point_noise_px = noise.tie_point_px;
+  solution.noise = noise;
   solution.iterations = steps;
   return solution;
-}
-
-Noise noise_of(const Solution& solution) {
-  return {solution.corner_noise_px, solution.match_noise_px, solution.tie_point_noise_px};
 }
 
 std::vector<std::optional<Eigen::Vector3d>> places_of(const Observations& observations,
@@ -95,8 +129,8 @@ void add_residuals(const Observations& observations,
                    Solution* into) {
   const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
   const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
-  const auto is_outlier = [](const Vector2d& r, double own, double common) {
-    return !(r.norm() < k_outlier_at * std::hypot(own, common));
+  const auto is_outlier = [](const Vector2d& r, double stddev) {
+    return !(r.norm() < k_outlier_at * stddev);
   };
   into->corner_residuals.clear();
   into->match_residuals.clear();
@@ -111,15 +145,16 @@ void add_residuals(const Observations& observations,
                                observations.board.p_corner(seen.corner).head<2>(), &px))
       r = px - seen.px;
     into->corner_residuals.push_back(r);
-    into->corner_outlier.push_back(is_outlier(r, seen.stddev_px, noise.corner_px));
+    into->corner_outlier.push_back(is_outlier(r, noise.corner.total(seen.stddev_px)));
   }
   for (const Match& match : observations.matches) {
     const auto& pose = into->world_from_board[static_cast<size_t>(match.pose)];
     const auto px = pose ? predicted(observations, *into, *pose, match) : std::nullopt;
     const Vector2d r = px ? Vector2d(*px - match.px_projector) : none;
     into->match_residuals.push_back(r);
-    into->match_outlier.push_back(is_outlier(r, match.stddev_px, noise.match_px));
+    into->match_outlier.push_back(is_outlier(r, noise.match.total(match.stddev_px)));
   }
+  into->corner_scatter_px = level_of(without_stated(into->corner_residuals), {}).common_px;
   into->points = places_of(observations, at);
   for (const TiePointObservation& tie_observation : observations.tie_observations) {
     const auto& p = into->points[static_cast<size_t>(tie_observation.point)];
@@ -146,10 +181,11 @@ Result<Solution> rounds(const Observations& observations,
     steps += descent.steps;
     solution = solution_at(descent.parameters, noise, steps);
     add_residuals(observations, descent.parameters, noise, &solution);
-    const Noise found{noise_of(solution.corner_residuals),
-                      observations.matches.empty() ? noise.match_px : noise_of(solution.match_residuals),
-                      tie_point_noise(observations, solution.tie_point_residuals)};
+    const Noise found{level_of(observations.corners, solution.corner_residuals, noise.corner),
+                      level_of(observations.matches, solution.match_residuals, noise.match),
+                      tie_point_level(observations, solution.tie_point_residuals)};
     if (is_last) {
+      solution.noise = found;
       solution.covariance = joint.covariance(descent.parameters, found);
       break;
     }
@@ -283,7 +319,7 @@ Result<Solution> solve_from(const Observations& observations,
                             const SolveOptions& options,
                             const Solution& start) {
   LIMN_TRY(Parameters parameters, unknowns_with_models(observations, options, start));
-  return rounds(observations, options, std::move(parameters), noise_of(start));
+  return rounds(observations, options, std::move(parameters), start.noise);
 }
 
 Result<Solution> solve_again(const Observations& observations,
@@ -292,13 +328,37 @@ Result<Solution> solve_again(const Observations& observations,
                              int left_out,
                              bool to_rounding) {
   LIMN_TRY(Parameters parameters, unknowns_with_models(observations, options, start));
-  const Noise noise = noise_of(start);
+  const Noise noise = start.noise;
   if (left_out >= 0) parameters.world_from_board[static_cast<size_t>(left_out)].reset();
   BundleAdjuster joint(observations, options, left_out);
   LIMN_TRY(const BundleAdjuster::Summary descent,
            joint.minimise(std::move(parameters), noise,
                           to_rounding ? BundleAdjuster::k_to_rounding : BundleAdjuster::k_to_significance));
   return solution_at(descent.parameters, noise, descent.steps);
+}
+
+Rig with_distortion_values(Rig rig) {
+  static const LensModel k_distorted = LensModel::parse("LENSMODEL_OPENCV4").value();
+  for (auto* imagers : {&rig.cameras, &rig.projectors}) {
+    for (Imager& imager : *imagers) {
+      if (imager.lens.model.value_count() == 4) imager.lens = with_model(imager.lens, k_distorted);
+    }
+  }
+  return rig;
+}
+
+Solution with_distortion_unknown(const Observations& observations, Solution solution) {
+  const auto is_pinhole = [](const Imager& imager) { return imager.lens.model.value_count() == 4; };
+  if (std::none_of(solution.rig.cameras.begin(), solution.rig.cameras.end(), is_pinhole) &&
+      std::none_of(solution.rig.projectors.begin(), solution.rig.projectors.end(), is_pinhole))
+    return solution;
+  solution.rig = with_distortion_values(std::move(solution.rig));
+  SolveOptions options;
+  options.radial = k_pinhole_radial;
+  options.tangential = k_pinhole_tangential;
+  solution.covariance =
+      BundleAdjuster(observations, options).covariance(unknowns_of(solution), solution.noise);
+  return solution;
 }
 
 Result<Pose> board_pose_from_cameras(const Observations& observations, const Solution& solution, int pose) {
@@ -311,7 +371,7 @@ Result<Pose> board_pose_from_cameras(const Observations& observations, const Sol
   LIMN_TRY(const Pose first, board_pose_seed(only, solution.rig));
   const SolveOptions options;
   const BundleAdjuster joint(only, options);
-  return joint.board_pose(unknowns_of(solution), pose, noise_of(solution), first);
+  return joint.board_pose(unknowns_of(solution), pose, solution.noise, first);
 }
 
 std::optional<Vector2d> predicted(const Observations& observations,

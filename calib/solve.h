@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/measurement_model.h"
+#include "calib/noise.h"
 #include "calib/observations.h"
 #include "core/result.h"
 #include "core/rig.h"
@@ -48,8 +49,8 @@ struct Solution {
   /// Positions of the tie points, m, world frame; none where no observation determines the depth.
   std::vector<std::optional<Eigen::Vector3d>> points;
   std::vector<Eigen::Vector2d> tie_point_residuals;
-  /// Noise of one coordinate in addition to its own stddev, px: estimated from the residuals.
-  double corner_noise_px = 0, match_noise_px = 0, tie_point_noise_px = 0;
+  Noise noise = {};              ///< estimated from the residuals
+  double corner_scatter_px = 0;  ///< how the corners' residuals scatter: one coordinate, by the median
   int iterations = 0;
   /// Covariance of the devices' parameters, from the final Jacobian (robust weights and priors included),
   /// board poses and bend marginalised. Order: camera 0's values and pose (boxplus's perturbation), camera
@@ -80,6 +81,14 @@ Result<Solution> solve_again(const Observations& observations,
 Result<Solution> solve_from(const Observations& observations,
                             const SolveOptions& options,
                             const Solution& start);
+
+/// The same rig with each pinhole lens written as LENSMODEL_OPENCV4 without distortion.
+Rig with_distortion_values(Rig rig);
+
+/// The same solution, with these lenses and with the covariance of their distortion. A pinhole lens is chosen
+/// where the observations show no distortion; how much there may be nevertheless is part of what is not
+/// known. The prior is that of lenses that pass as pinholes, not that of SolveOptions.
+Solution with_distortion_unknown(const Observations& observations, Solution solution);
 
 /// Estimates the pose of one placement of the board from the corners that cameras see, everything else as in
 /// `solution`.

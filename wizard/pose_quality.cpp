@@ -24,8 +24,10 @@ double predicted_mm(const calib::Assessment& assessment) {
 std::string more_helps(const std::vector<PoseJudged>& poses) {
   if (poses.empty() || !poses.back().assessment) return "too few poses to solve a rig";
   const calib::Assessment& last = *poses.back().assessment;
-  for (const calib::Fault& fault : last.faults)
-    if (wants_poses(fault)) return calib::to_text(fault.name);
+  for (const auto* faults : {&last.faults, &last.advice}) {
+    for (const calib::Fault& fault : *faults)
+      if (wants_poses(fault)) return calib::to_text(fault.name);
+  }
   if (last.verdict != calib::Verdict::good) return "the rig is " + calib::to_text(last.verdict);
   const double mm = predicted_mm(last);
   if (mm <= calib::k_fine_mm) return "";

@@ -110,8 +110,7 @@ class FaultTeller {
     std::set<calib::FaultName> names;
     for (const calib::Fault& fault : faults) {
       const bool is_new = names.insert(fault.name).second && !reported_.contains(fault.name);
-      if (is_new)
-        say_(fmt::format("fault {}: {}; {}.", calib::to_text(fault.name), fault.evidence, fault.advice));
+      if (is_new) say_("fault " + calib::to_text(fault));
     }
     for (const calib::FaultName name : reported_)
       if (!names.contains(name)) say_(fmt::format("fault {} is gone", calib::to_text(name)));

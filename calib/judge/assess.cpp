@@ -70,16 +70,21 @@ std::vector<DeviceQuality> device_qualities(const Observations& observations, co
 }
 
 // For each projector: the distance on the boards, mm, that 95 % of the held-out errors stay within, with the
-// matches' own noise subtracted, because it is no error of the rig.
+// matches' own noise subtracted, because it is no error of the rig. A pose that differs from all others
+// (odd_pose) is a fault of its own: how far it moves the solution is in the jackknife.
 std::vector<double> held_out_errors_mm(const Observations& observations, const CrossValidation& score) {
   struct Errors {
     std::vector<double> mm;
     double squared = 0, noise = 0;  // px^2
   };
+  std::set<std::string> odd;
+  for (const OddPose& pose : odd_poses(score)) odd.insert(score.poses[pose.index].pose);
   std::vector<Errors> errors(observations.projectors.size());
   for (size_t i = 0; i < observations.matches.size(); ++i) {
     const Match& match = observations.matches[i];
-    if (!std::isfinite(score.errors_m[i])) continue;
+    if (!std::isfinite(score.errors_m[i]) ||
+        odd.contains(observations.poses[static_cast<size_t>(match.pose)]))
+      continue;
     Errors& of = errors[static_cast<size_t>(match.projector)];
     of.mm.push_back(score.errors_m[i] * 1e3);
     of.squared += score.residuals[i].squaredNorm();
@@ -94,6 +99,18 @@ std::vector<double> held_out_errors_mm(const Observations& observations, const C
   return p95;
 }
 
+// Moves the faults that cost nothing where the predicted error is good to the advice.
+void separate_advice(Assessment* assessment) {
+  const auto is_advice = [](const Fault& fault) {
+    return fault.severity == Severity::note &&
+           (fault.name == FaultName::little_overlap || fault.name == FaultName::low_coverage);
+  };
+  for (const Fault& fault : assessment->faults) {
+    if (is_advice(fault)) assessment->advice.push_back(fault);
+  }
+  std::erase_if(assessment->faults, is_advice);
+}
+
 // The verdict on cameras alone, from the held-out corners and from how well the lenses are determined.
 void judge_cameras(const Observed& observed, const Solution& solution, Assessment* assessment) {
   double worst = 0;
@@ -102,7 +119,7 @@ void judge_cameras(const Observed& observed, const Solution& solution, Assessmen
     worst = std::max(worst, assessment->lens_stddev_px.back());
   }
   assessment->normalised_residuals = normalised_residuals(observed.observations, solution, {});
-  assessment->faults = faults(observed, solution, assessment->devices, assessment->held_out);
+  assessment->faults = merged(faults(observed, solution, assessment->devices, assessment->held_out));
   const double px = assessment->held_out.rms_px;
   const Severity severity = heaviest(assessment->faults);
   if (px <= k_good_px && worst <= k_good_lens_px && severity == Severity::note)
@@ -132,6 +149,7 @@ double Assessment::worst_predicted_mm() const {
 
 void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
   assessment->faults.insert(assessment->faults.end(), faults.begin(), faults.end());
+  assessment->faults = merged(assessment->faults);
   const Severity severity = heaviest(faults);
   if (severity == Severity::reject) assessment->verdict = Verdict::reject;
   if (severity == Severity::doubt) assessment->verdict = std::max(assessment->verdict, Verdict::usable);
@@ -146,13 +164,16 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
     judge_cameras(observed, solution, &assessment);
     return assessment;
   }
-  const Uncertainty uncertainty = estimated_uncertainty(observations, solution, assessment.held_out.rigs);
+  const Solution judged = with_distortion_unknown(observations, solution);
+  std::vector<Rig> without;
+  for (const Rig& rig : assessment.held_out.rigs) without.push_back(with_distortion_values(rig));
+  const Uncertainty uncertainty = estimated_uncertainty(observations, judged, without);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
   assessment.normalised_residuals =
       normalised_residuals(observations, solution, assessment.held_out.residuals);
   assessment.held_out_error_mm = held_out_errors_mm(observations, assessment.held_out);
-  assessment.propagated_error_mm = propagated_error_mm(observations, solution, uncertainty);
-  assessment.error_maps = error_maps(observations, solution, uncertainty);
+  assessment.propagated_error_mm = propagated_error_mm(observations, judged, uncertainty);
+  assessment.error_maps = error_maps(observations, judged, uncertainty);
   for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)
     assessment.predicted_error_mm.push_back(
         std::max(k_rig_of_held_out * assessment.held_out_error_mm[i], assessment.propagated_error_mm[i]));
@@ -165,12 +186,13 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
   }
   assessment.decoded_share = lit > 0 ? decoded / lit : 0;
   assessment.decoded_of_contrasted = contrasted > 0 ? decoded / contrasted : 0;
-  assessment.faults = faults(observed, solution, assessment.devices, assessment.held_out);
+  assessment.faults = merged(faults(observed, solution, assessment.devices, assessment.held_out));
   const double px = assessment.held_out.rms_px;
   const double mm = assessment.worst_predicted_mm();
   const double on_boards_mm =
       *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
   const bool extrapolates = mm > std::max(k_fine_mm, k_beyond_boards * on_boards_mm);
+  if (mm <= k_good_mm && !extrapolates) separate_advice(&assessment);
   const Severity severity = heaviest(assessment.faults);
   if (px <= k_good_px && mm <= k_good_mm && !extrapolates && severity == Severity::note) {
     assessment.verdict = Verdict::good;

@@ -44,7 +44,10 @@ struct Assessment {
   int decode_outliers = 0;
   std::vector<EpipolarResidual> epipolar;    ///< over decoded pixels of the whole image, on the board or not
   NormalisedResiduals normalised_residuals;  ///< whether the stated standard deviations are true
-  std::vector<Fault> faults;
+  std::vector<Fault> faults;                 ///< one for each name
+  /// What is worth knowing but costs nothing that counts: little_overlap and low_coverage where the predicted
+  /// error is good.
+  std::vector<Fault> advice = {};
 
   /// The largest predicted error; infinite without projectors.
   double worst_predicted_mm() const;

@@ -82,7 +82,7 @@ double common_stretch(const Rig& rig) {
 
 BoardOffsets board_offsets(const Observations& observations, const Solution& solution) {
   BoardOffsets found;
-  const double noise = std::max(solution.corner_noise_px, 1e-3);
+  const double noise = std::max(solution.corner_scatter_px, 1e-3);
   double across = 0, out = 0;
   for (const CornerSums& sum : corner_sums(observations, solution)) {
     found.offsets.emplace_back(Vector3d::Zero());

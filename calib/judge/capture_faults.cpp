@@ -316,7 +316,9 @@ void note_motion(const PairSeries& seen, std::vector<Fault>* faults) {
                      limit),
          "put board, camera and projector on firm ground and capture this pose again, or leave it out with "
          "--skip-poses " +
-             seen.pose_name(*quality)});
+             seen.pose_name(*quality),
+         Severity::doubt,
+         {seen.pose_name(*quality)}});
   }
 }
 
@@ -346,10 +348,10 @@ Sharpness sharpness(const PairSeries& seen, const CaptureQuality& quality) {
   return found;
 }
 
-void note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
+bool note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
   const double contrast =
       seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
-  if (contrast >= k_sharp) return;
+  if (contrast >= k_sharp) return false;
   faults->push_back(
       {FaultName::defocus,
        fmt::format(
@@ -358,6 +360,7 @@ void note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
            seen.both(), sharpness(seen, *seen.series[0]).stripe_px, 100 * contrast, 100 * k_sharp),
        "focus the projector at the prototype's distance, then the camera; close the camera's aperture a "
        "little"});
+  return true;
 }
 
 // The exponent p for which light 0.5 + 0.5 cos (mean 1/2), raised to p, has this mean: the mean is
@@ -425,7 +428,9 @@ void note_odd_images(const PairSeries& seen, std::vector<Fault>* faults) {
                      odd.finding,
                      quality->odd.size() > 1 ? fmt::format(" (and {} more)", quality->odd.size() - 1) : ""),
          "increase the delay between showing and grabbing (the display's latency), and capture this pose "
-         "again"});
+         "again",
+         Severity::doubt,
+         {seen.pose_name(*quality)}});
   }
 }
 
@@ -485,13 +490,13 @@ std::vector<Fault> capture_faults(const Observed& observed) {
     note_between(seen, &faults);
     const bool unsteady = note_exposure(seen, &faults);
     note_motion(seen, &faults);
-    note_defocus(seen, &faults);
+    const bool blurred = note_defocus(seen, &faults);
     const bool bright = !unsteady && note_room_light(seen, &faults);
     const bool clipped = note_saturation(seen, &faults);
     // Light that changes, and white that is clipped, make correct waves look wrong.
     if (!unsteady && !clipped) note_gamma(seen, &faults);
-    // Unsteady light and noise make sums wrong, too.
-    if (!unsteady && !bright) note_odd_images(seen, &faults);
+    // Unsteady light and noise make sums wrong, too, and without contrast all fine stripes look alike.
+    if (!unsteady && !bright && !blurred) note_odd_images(seen, &faults);
   }
   return faults;
 }

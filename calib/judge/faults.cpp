@@ -22,8 +22,8 @@ namespace {
 constexpr double k_little_tilt_deg = 10;
 constexpr double k_low_share = 0.5;  // share of illuminated pixels decoded
 constexpr double k_low_coverage = 0.25;
-constexpr double k_odd_pose = 2.5;  // held-out RMS of a pose divided by the median of the others
 constexpr int k_few_poses = 5;
+constexpr const char* k_skip_poses = "--skip-poses ";  // advice that ends with this option lists poses
 // A smaller share of the boards illuminated, by a smaller share of the panel: most light lands where nothing
 // was measured.
 constexpr double k_overlap = 0.5, k_panel_used = 0.35;
@@ -42,18 +42,23 @@ constexpr double k_zoom = 0.03;  // share of the field of view; refocusing chang
 
 void note_board(const Observations& observations, const Solution& solution, std::vector<Fault>* faults) {
   for (int pose = 0; pose < static_cast<int>(observations.poses.size()); ++pose) {
+    const std::string& name = observations.poses[static_cast<size_t>(pose)];
     const bool seen = std::any_of(observations.corners.begin(), observations.corners.end(),
                                   [&](const CornerObservation& corner) { return corner.pose == pose; });
-    if (!seen)
-      faults->push_back(
-          {FaultName::board_not_visible,
-           fmt::format("no camera sees the board in {}", observations.poses[static_cast<size_t>(pose)]),
-           "a scene capture is fine; otherwise light the board and keep it in view", Severity::note});
+    const bool is_scene = std::any_of(observations.points.begin(), observations.points.end(),
+                                      [&](const TiePoint& point) { return point.pose == pose; });
+    if (!seen && !is_scene)
+      faults->push_back({FaultName::board_not_visible,
+                         fmt::format("no camera sees the board in {}", name),
+                         "a scene capture is fine; otherwise light the board and keep it in view",
+                         Severity::note,
+                         {name}});
     if (seen && !solution.world_from_board[static_cast<size_t>(pose)])
       faults->push_back({FaultName::board_not_placed,
-                         fmt::format("too few corners, or all on a line, in {}; the pose is not used",
-                                     observations.poses[static_cast<size_t>(pose)]),
-                         "keep more of the board in view and lit", Severity::note});
+                         fmt::format("too few corners, or all on a line, in {}; the pose is not used", name),
+                         "keep more of the board in view and lit",
+                         Severity::note,
+                         {name}});
   }
 }
 
@@ -93,7 +98,9 @@ void note_images(const Observed& observed,
                        observations.cameras[static_cast<size_t>(share.camera)].name,
                        observations.projectors[static_cast<size_t>(share.projector)].name,
                        observations.poses[static_cast<size_t>(share.pose)], 100 * part, share.lit),
-           "focus the projector, darken the room, raise the exposure without saturating"});
+           "focus the projector, darken the room, raise the exposure without saturating",
+           Severity::doubt,
+           {observations.poses[static_cast<size_t>(share.pose)]}});
   }
   for (const DeviceQuality& device : devices) {
     if (device.coverage < k_low_coverage)
@@ -136,17 +143,16 @@ void note_overlap(const Observations& observations,
 }
 
 void note_odd_poses(const CrossValidation& score, std::vector<Fault>* faults) {
-  for (const HeldOutPose& pose : score.poses) {
-    std::vector<double> others;
-    for (const HeldOutPose& other : score.poses) {
-      if (other.pose != pose.pose) others.push_back(other.rms_px);
-    }
-    if (others.size() < 3 || pose.rms_px < k_odd_pose * median(others) || pose.rms_px < k_good_px) continue;
+  for (const OddPose& odd : odd_poses(score)) {
+    const HeldOutPose& pose = score.poses[odd.index];
+    if (pose.rms_px < k_good_px) continue;
     faults->push_back(
         {FaultName::odd_pose,
          fmt::format("{}: held-out error {:.2f} px, median of the other poses {:.2f} px", pose.pose,
-                     pose.rms_px, median(others)),
-         "the board or a device may have moved while it was captured; try --skip-poses " + pose.pose});
+                     pose.rms_px, odd.others_px),
+         "the board or a device may have moved while it was captured; try --skip-poses " + pose.pose,
+         Severity::doubt,
+         {pose.pose}});
   }
 }
 
@@ -323,17 +329,45 @@ std::vector<Fault> faults_against(const Rig& earlier, const Rig& now) {
   return found;
 }
 
+std::vector<Fault> merged(const std::vector<Fault>& faults) {
+  std::vector<Fault> found;
+  std::map<FaultName, int> further;
+  for (const Fault& fault : faults) {
+    const auto same = std::find_if(found.begin(), found.end(),
+                                   [&](const Fault& earlier) { return earlier.name == fault.name; });
+    if (same == found.end()) {
+      found.push_back(fault);
+      continue;
+    }
+    ++further[fault.name];
+    same->severity = std::max(same->severity, fault.severity);
+    for (const std::string& pose : fault.poses) {
+      if (std::find(same->poses.begin(), same->poses.end(), pose) != same->poses.end()) continue;
+      same->poses.push_back(pose);
+      if (same->advice.find(k_skip_poses) != std::string::npos) same->advice += "," + pose;
+    }
+  }
+  for (Fault& fault : found) {
+    if (further[fault.name] > 0)
+      fault.evidence += fmt::format(" (and {} more of the same kind)", further[fault.name]);
+  }
+  return found;
+}
+
 Severity heaviest(const std::vector<Fault>& faults) {
   Severity worst = Severity::note;
   for (const Fault& fault : faults) worst = std::max(worst, fault.severity);
   return worst;
 }
 
+std::string to_text(const Fault& fault) {
+  return fmt::format("{}{}{}: {}; {}.", to_text(fault.name), fault.poses.empty() ? "" : " in ",
+                     fmt::join(fault.poses, ", "), fault.evidence, fault.advice);
+}
+
 std::string to_text(const std::vector<Fault>& faults) {
   std::string text;
-  for (const Fault& fault : faults)
-    text += fmt::format("{}{}: {}; {}.", text.empty() ? "" : "\n", to_text(fault.name), fault.evidence,
-                        fault.advice);
+  for (const Fault& fault : faults) text += fmt::format("{}{}", text.empty() ? "" : "\n", to_text(fault));
   return text;
 }
 

@@ -82,6 +82,7 @@ struct Fault {
   std::string evidence;  ///< with numbers
   std::string advice;
   Severity severity = Severity::doubt;
+  std::vector<std::string> poses = {};  ///< names of the poses that show it; empty: it concerns all
 };
 
 /// The faults that captures and their solution show: those of capture_faults (calib/judge/capture_faults.h),
@@ -89,6 +90,8 @@ struct Fault {
 /// - keystone_or_scaling: a projector's pixels are not square;
 /// - wrong_camera_resolution: a camera's pixels are not square, or its image was cropped;
 /// - little_overlap: a projector reaches little of what cameras see;
+/// - odd_pose: a pose that odd_poses() (calib/cross_validation.h) names, with a held-out error that is not
+/// good;
 /// - rotated_projection: the image is upside down and no ceiling-mounted projector explains it;
 /// - bent_board, wrong_square_size: calib/judge/board_faults.h.
 /// `devices` and `held_out` may be empty; the faults that need them are then not checked.
@@ -103,10 +106,16 @@ std::vector<Fault> faults(const Observed& observed,
 /// moved.
 std::vector<Fault> faults_against(const Rig& earlier, const Rig& now);
 
+/// One entry for each name, in the order of first appearance: all poses, the evidence of the first with the
+/// number of further ones, the highest severity.
+std::vector<Fault> merged(const std::vector<Fault>& faults);
+
 /// The highest severity among them; note when there are none.
 Severity heaviest(const std::vector<Fault>& faults);
 
-/// One line for each: "NAME: EVIDENCE; ADVICE."
+/// "NAME in POSE, POSE: EVIDENCE; ADVICE."
+std::string to_text(const Fault& fault);
+/// One line for each.
 std::string to_text(const std::vector<Fault>& faults);
 
 }  // namespace limn::calib

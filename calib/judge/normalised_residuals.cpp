@@ -27,11 +27,11 @@ int camera_at(const Solution& solution, int camera) {
 }
 
 double corner_variance(const Solution& solution, const CornerObservation& seen) {
-  return std::pow(std::hypot(seen.stddev_px, solution.corner_noise_px), 2);
+  return std::pow(solution.noise.corner.total(seen.stddev_px), 2);
 }
 
 double match_variance(const Solution& solution, const Match& match) {
-  return std::pow(std::hypot(match.stddev_px, solution.match_noise_px), 2);
+  return std::pow(solution.noise.match.total(match.stddev_px), 2);
 }
 
 // A board pose estimated from corners alone: its covariance by their noise, and its derivatives by the

@@ -20,13 +20,14 @@ using Eigen::Vector3d;
 constexpr double k_moved_m = 0.15;
 constexpr double k_turned = 40 * std::numbers::pi / 180;
 constexpr int k_panel_grid = 9;  // points along each side of the panel
-// Share of its width and height: half of its light falls on the target.
-constexpr double k_panel_share = 0.7;
-constexpr double k_relief_m = 0.05;  // relief of the target, to both sides
+// Share of its width and height: prototypes are lit with some margin.
+constexpr double k_panel_share = 0.75;
+constexpr double k_relief_m = 0.03;  // relief of the target, to both sides
 // Minimum number of points for a camera to measure a target's pose.
 constexpr int k_least_points = 6;
-constexpr size_t k_measured_points = 24;      // the corners of six markers
-constexpr double k_least_measured_px = 0.03;  // noise of markers' corners in good images
+constexpr size_t k_measured_points = 24;  // the corners of six markers
+constexpr double k_least_measured_px =
+    0.02;  // noise of markers' corners: 0.01 to 0.03 px (limn bench tracker)
 // 70 degrees: nobody looks for a part on surfaces lit at a more grazing angle.
 constexpr double k_least_cosine = 0.34;
 constexpr double k_share = 0.95;
@@ -324,7 +325,7 @@ Uncertainty estimated_uncertainty(const Observations& observations,
       variance = std::max(variance, jackknife[i] / scatter[i]);
   }
   uncertainty.covariance *= variance;
-  uncertainty.measured_px = std::max(solution.corner_noise_px, k_least_measured_px);
+  uncertainty.measured_px = std::max(solution.corner_scatter_px, k_least_measured_px);
   return uncertainty;
 }
 

@@ -317,6 +317,7 @@ Explanation explain(const Observed& observed, const Solution& solution, const As
   const Observations& observations = observed.observations;
   Explanation words;
   words.verdict = verdict_words(observations, assessment);
+  for (const Fault& fault : assessment.advice) words.advice.push_back(to_text(fault));
   advise_edges(observations, &words.advice);
   advise_stances(stances(observations, solution), assessment, &words.advice);
   advise_depths(observations, assessment.error_maps, &words.advice);

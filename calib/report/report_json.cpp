@@ -67,12 +67,15 @@ Json by_projector(const Report& report, const std::vector<double>& errors) {
 
 Json error_json(const Report& report) {
   const Assessment& a = report.assessment;
-  return {
-      {"p95", rounded(a.worst_predicted_mm())},
-      {"per_projector", by_projector(report, a.predicted_error_mm)},
-      {"held_out", by_projector(report, a.held_out_error_mm)},
-      {"propagated", by_projector(report, a.propagated_error_mm)},
-      {"from", "the larger of the held-out error and of the noise propagated to moved and turned targets"}};
+  return {{"p95", rounded(a.worst_predicted_mm())},
+          {"per_projector", by_projector(report, a.predicted_error_mm)},
+          {"held_out", by_projector(report, a.held_out_error_mm)},
+          {"propagated", by_projector(report, a.propagated_error_mm)},
+          {"from",
+           "the larger of the held-out error and of the uncertainty propagated to a target in place, moved "
+           "by 150 "
+           "mm and turned by 40 degrees"},
+          {"region", "the space where the boards were, as far as the projector and camera 0 reach"}};
 }
 
 // All models that were tried; only the given ones where nothing was selected.
@@ -146,7 +149,10 @@ std::string report_json(const Report& report) {
   const Assessment& a = report.assessment;
   Json faults = Json::array(), seconds = Json::object();
   for (const Fault& fault : a.faults)
-    faults.push_back({{"name", to_text(fault.name)}, {"evidence", fault.evidence}, {"advice", fault.advice}});
+    faults.push_back({{"name", to_text(fault.name)},
+                      {"poses", fault.poses},
+                      {"evidence", fault.evidence},
+                      {"advice", fault.advice}});
   for (const auto& [stage, value] : report.seconds) seconds[stage] = std::round(value * 1e3) / 1e3;
   const auto since_last =
       report.history.rig ? device_moves(*report.history.rig, report.observed.observations, report.solution)

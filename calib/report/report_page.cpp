@@ -76,8 +76,10 @@ std::string fault_list(const std::vector<Fault>& faults) {
   if (faults.empty()) return "";
   std::string html = "<ul class='faults'>\n";
   for (const Fault& fault : faults)
-    html += fmt::format("<li><b>{}</b> {}.<br><em>What to do:</em> {}.</li>\n", to_text(fault.name),
-                        escaped(fault.evidence), escaped(fault.advice));
+    html += fmt::format("<li><b>{}</b>{}{}: {}.<br><em>What to do:</em> {}.</li>\n", to_text(fault.name),
+                        fault.poses.empty() ? "" : " in ",
+                        escaped(fmt::format("{}", fmt::join(fault.poses, ", "))), escaped(fault.evidence),
+                        escaped(fault.advice));
   return html + "</ul>\n";
 }
 

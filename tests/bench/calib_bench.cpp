@@ -321,7 +321,7 @@ void print_opencv_offsets(const TrueRig& truth, const std::vector<View>& views) 
 
 // ---- the table ----
 
-constexpr double k_pnp_px = 0.03;  // noise of the prototype's known points, as in the stated error
+constexpr double k_pnp_px = 0.02;  // noise of the prototype's known points, as in the stated error
 constexpr int k_points = 2000;
 
 std::string row(const Landed& errors) {
@@ -344,8 +344,8 @@ Status run_case(const Case& test_case, const fs::path& folder) {
   LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, options, solution));
   fmt::print(
       "  Limn: {} corners {:.3f} px, {} matches {:.3f} px; bend {:.3f} {:.3f} mm; held-out {:.3f} px; {}\n",
-      observed.observations.corners.size(), solution.corner_noise_px, observed.observations.matches.size(),
-      solution.match_noise_px, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(),
+      observed.observations.corners.size(), solution.noise.corner.common_px, observed.observations.matches.size(),
+      solution.noise.match.common_px, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(),
       assessment.held_out.rms_px, calib::to_text(assessment.verdict));
   for (const calib::Fault& fault : assessment.faults)
     fmt::print("  {}: {}\n", calib::to_text(fault.name), fault.evidence);

@@ -1,115 +1,150 @@
 // How often the stated 95 % error holds. Rigs with known truth and noisy observations (no images, so that
-// there can be many) are solved and assessed; then the share of unseen points within the stated error is
-// counted. Usage: calib_stated [CASES [FIRST]]
+// there can be many) are solved with selected lens models and assessed as limn solve does; then the share of
+// unseen points within the stated error is counted, for each kind of prototype in place, moved and turned.
+// Usage: calib_stated [CASES [FIRST [GROUP]]]
 #include <fmt/core.h>
 
+#include <array>
+
 #include "calib/judge/assess.h"
-#include "calib/judge/uncertainty.h"
-#include "calib/solve.h"
+#include "calib/model_selection.h"
+#include "core/median.h"
 #include "tests/calib/true_rig.h"
 
 namespace limn::test {
 namespace {
 
-constexpr int k_shares = 3;  // by the scatter's covariance, by the jackknife's, as stated
+// Rigs of a group are alike in what is named here; the rest is drawn.
+struct Group {
+  std::string name;
+  int poses = 10;
+  double tilt = 0.5;      // rad
+  double spread = 1;      // spread of the boards over the space
+  double bow_m = 0;       // the same in all poses
+  double sag_mm = 0;      // standard deviation of a bend that each pose has by itself
+  bool is_sharp = false;  // noise of good images instead of a drawn one
+};
+
+const std::vector<Group> k_groups = {
+    {.name = "12 poses", .poses = 12},
+    {.name = "8 poses", .poses = 8},
+    {.name = "5 poses", .poses = 5},
+    {.name = "sharp images", .poses = 12, .is_sharp = true},
+    {.name = "bowed", .bow_m = 0.4e-3},
+    {.name = "sagging", .sag_mm = 0.2},
+    {.name = "almost parallel", .tilt = 0.06},
+    {.name = "almost parallel, in the middle", .tilt = 0.06, .spread = 0.15},
+};
 
 struct Drawn {
   RigOptions rig;
-  double corner_px = 0, match_px = 0, pose_mm = 0;
+  double corner_px = 0, match_px = 0;
 };
 
-// Cases vary in everything in which real rigs may differ.
-Drawn drawn(unsigned seed) {
-  std::mt19937_64 rng(seed);
+Drawn drawn(const Group& group, unsigned seed) {
+  std::mt19937_64 rng(seed * 7919 + 17);
   std::uniform_real_distribution<double> even(0, 1);
   const auto pick = [&](std::initializer_list<double> of) {
     return of.begin()[static_cast<size_t>(even(rng) * static_cast<double>(of.size()))];
   };
-  Drawn drawn;
-  drawn.rig.k1 = pick({0, -0.05, -0.15});
-  drawn.rig.shift = pick({0, 0.5, 1.1});
-  drawn.rig.bow_m = pick({0, 0.4e-3});
-  drawn.rig.poses = static_cast<int>(pick({6, 9, 12}));
-  drawn.rig.tilt = pick({0.4, 0.6});
-  drawn.rig.asunder = pick({0.3, 0.6});
-  drawn.rig.seed = seed;
-  drawn.corner_px = pick({0.015, 0.05, 0.1});
-  drawn.match_px = pick({0.03, 0.06, 0.12});
-  drawn.pose_mm = pick({0, 0.1, 0.3});
-  return drawn;
+  const auto between = [&](double low, double high) { return low * std::pow(high / low, even(rng)); };
+  Drawn made;
+  made.rig = {.k1 = pick({0, -0.05, -0.15}),
+              .shift = pick({0, 0.5, 1.1}),
+              .bow_m = group.bow_m,
+              .poses = group.poses,
+              .tilt = group.tilt * between(0.8, 1.2),
+              .spread = group.spread,
+              .asunder = between(0.3, 0.6),
+              .seed = seed};
+  made.corner_px = group.is_sharp ? 0.01 : between(0.015, 0.1);
+  made.match_px = group.is_sharp ? 0.02 : between(0.03, 0.12);
+  return made;
 }
 
 // Boards sag differently in each pose; the solver has no model for that.
-void sag(const TrueRig& truth, double mm, std::mt19937_64* rng, calib::Observations* observations) {
+calib::Observations sagging(const TrueRig& truth, double mm, std::mt19937_64* rng) {
+  calib::Observations observations = observed_perfectly(truth, 4);
+  if (mm == 0) return observations;
+  observations.corners.clear();
+  observations.matches.clear();
   std::normal_distribution<double> scatter(0, 1e-3 * mm);
   for (size_t pose = 0; pose < truth.world_from_board.size(); ++pose) {
-    TrueRig sagging = truth;
-    sagging.bow_m += Eigen::Vector2d(scatter(*rng), scatter(*rng));
-    const calib::Observations all = observed_perfectly(sagging, 4);
-    const auto take = [&](const auto& from, auto* to) {
+    TrueRig bent = truth;
+    bent.bow_m += Eigen::Vector2d(scatter(*rng), scatter(*rng));
+    const calib::Observations all = observed_perfectly(bent, 4);
+    const auto copy = [&](const auto& from, auto* to) {
       for (const auto& seen : from) {
         if (seen.pose == static_cast<int>(pose)) to->push_back(seen);
       }
     };
-    take(all.corners, &observations->corners);
-    take(all.matches, &observations->matches);
+    copy(all.corners, &observations.corners);
+    copy(all.matches, &observations.matches);
   }
+  return observations;
 }
 
-Status run(unsigned seed, double* share_sum) {
-  const Drawn draw = drawn(seed);
+// Sums over the rigs of a group: by prototype, then in place, moved, turned.
+struct Tally {
+  std::array<double, 9> shares{};
+  std::vector<double> widths;  // the stated error divided by the true 95th percentile
+  int rigs = 0, unsolved = 0;
+};
+
+void run(const Group& group, unsigned seed, Tally* tally) {
+  const Drawn draw = drawn(group, seed);
   const TrueRig truth = make_true_rig(draw.rig);
   std::mt19937_64 rng(seed + 1000);
-  calib::Observations observations = observed_perfectly(truth, 4);
-  if (draw.pose_mm > 0) {
-    observations.corners.clear();
-    observations.matches.clear();
-    sag(truth, draw.pose_mm, &rng, &observations);
-  }
+  calib::Observations observations = sagging(truth, group.sag_mm, &rng);
   add_noise(draw.corner_px, draw.match_px, &rng, &observations);
   for (calib::Match& match : observations.matches) match.stddev_px = draw.match_px;
-  LIMN_TRY(const calib::Solution solution, calib::solve(observations));
-  LIMN_TRY(const calib::Assessment assessment, calib::assess({observations, {}, {}, 0, 0}, {}, solution));
-  const double pnp_px = std::max(0.03, draw.corner_px);  // the prototype is measured as well as the board
-  std::vector<double> errors, clean;
-  for (const Prototype prototype : {Prototype::panel, Prototype::cluster, Prototype::concave}) {
-    const scene::Mesh mesh = prototype_mesh(prototype);
-    for (const double e : landed(truth, solution.rig, mesh, pnp_px, 400, &rng).pooled_mm())
-      errors.push_back(e);
-    for (const double e : landed(truth, solution.rig, mesh, 1e-6, 400, &rng).pooled_mm()) clean.push_back(e);
+  const auto choice = calib::solve_selecting_models(
+      observations, {.camera_model = calib::k_auto_lens, .projector_model = calib::k_auto_lens});
+  if (!choice) {
+    ++tally->unsolved;
+    return;
   }
-  const Eigen::MatrixXd jackknife = calib::jackknife_covariance(solution, assessment.held_out.rigs);
-  const auto p = [&](const Eigen::MatrixXd& covariance, double px) {
-    return calib::propagated_error_mm(observations, solution, {covariance, px})[0];
-  };
-  const double stated = assessment.predicted_error_mm[0];
-  const double shares[k_shares] = {share_within(errors, p(solution.covariance, pnp_px)),
-                                   share_within(errors, p(jackknife, pnp_px)), share_within(errors, stated)};
-  for (int i = 0; i < k_shares; ++i) share_sum[i] += shares[i];
-  fmt::print(
-      "{:4} k1 {:5.2f} shift {:3.1f} bow {:.1f} poses {:2} tilt {:.1f} corner {:.3f} match {:.3f} px sag "
-      "{:.1f} mm"
-      " | noise {:.3f} jackknife {:.3f} held-out {:.3f} stated {:.3f} true p95 {:.3f} mm, rig alone {:.3f} | "
-      "shares {:.3f} {:.3f} {:.3f}\n",
-      seed, draw.rig.k1, draw.rig.shift, 1e3 * draw.rig.bow_m, draw.rig.poses, draw.rig.tilt, draw.corner_px,
-      draw.match_px, draw.pose_mm, p(solution.covariance, 0), p(jackknife, 0),
-      assessment.held_out_error_mm[0], stated, p95(errors), p95(clean), shares[0], shares[1], shares[2]);
+  const double stated =
+      calib::assess({observations, {}, {}, 0, 0}, choice->solution, choice->held_out).predicted_error_mm[0];
+  const double pnp_px = std::max(0.02, draw.corner_px);  // the prototype is measured as well as the board
+  std::vector<double> all;
+  for (const Prototype prototype : {Prototype::panel, Prototype::cluster, Prototype::concave}) {
+    const Landed errors = landed(truth, choice->solution.rig, prototype_mesh(prototype), pnp_px, 240, &rng);
+    const auto at = 3 * static_cast<size_t>(prototype);
+    tally->shares[at] += share_within(errors.in_place_mm, stated);
+    tally->shares[at + 1] += share_within(errors.moved_mm, stated);
+    tally->shares[at + 2] += share_within(errors.turned_mm, stated);
+    for (const double e : errors.pooled_mm()) all.push_back(e);
+  }
+  tally->widths.push_back(stated / p95(all));
+  ++tally->rigs;
+}
+
+void print(const Group& group, const Tally& tally) {
+  fmt::print("{:<31} {:3} rigs", group.name, tally.rigs);
+  double sum = 0;
+  for (size_t i = 0; i < tally.shares.size(); ++i) {
+    fmt::print("{}{:.3f}", i % 3 == 0 ? " | " : " ", tally.shares[i] / tally.rigs);
+    sum += tally.shares[i] / tally.rigs;
+  }
+  fmt::print(" | all {:.3f}, stated / true {:.2f}, unsolved {}\n",
+             sum / static_cast<double>(tally.shares.size()), median(tally.widths), tally.unsolved);
   std::fflush(stdout);
-  return {};
 }
 
 }  // namespace
 }  // namespace limn::test
 
 int main(int argc, char** argv) {
+  using namespace limn::test;
   const int count = argc > 1 ? std::atoi(argv[1]) : 20, first = argc > 2 ? std::atoi(argv[2]) : 1;
-  double shares[limn::test::k_shares] = {};
-  for (int i = 0; i < count; ++i) {
-    const limn::Status status = limn::test::run(static_cast<unsigned>(first + i), shares);
-    if (status.ok()) continue;
-    fmt::print(stderr, "case {}: {}\n", first + i, status.message());
-    return 1;
+  const std::string only = argc > 3 ? argv[3] : "";
+  fmt::print(
+      "share of points within the stated error: panel | cluster | concave, each in place, moved, turned\n");
+  for (const Group& group : k_groups) {
+    if (!only.empty() && group.name != only) continue;
+    Tally tally;
+    for (int i = 0; i < count; ++i) run(group, static_cast<unsigned>(first + i), &tally);
+    if (tally.rigs > 0) print(group, tally);
   }
-  fmt::print("mean share: by the scatter {:.3f}, by the jackknife {:.3f}, as stated {:.3f}\n",
-             shares[0] / count, shares[1] / count, shares[2] / count);
 }

@@ -48,6 +48,7 @@ Diagnosis diagnosis_of(const CaptureSet& captures, const std::string& injected, 
       if (earlier) add_faults(faults_against(*earlier, solution->rig), &*assessment);
       diagnosis.verdict = to_text(assessment->verdict);
       diagnosis.faults = assessment->faults;
+      for (const Fault& advice : assessment->advice) diagnosis.faults.push_back(advice);
     }
     diagnosis.solution = *solution;
   }
@@ -345,6 +346,22 @@ TEST(Faults, ProjectorHardlyMeetsWhatTheCameraSees) {
                                   [](const Fault& fault) { return fault.name == FaultName::little_overlap; });
   ASSERT_NE(found, diagnosis.faults.end());
   EXPECT_EQ(found->severity, Severity::note);
+}
+
+TEST(Faults, OfOneKindAreOneEntryWithItsPoses) {
+  const Fault first{
+      FaultName::odd_pose, "pose01: 3 px", "try --skip-poses pose01", Severity::note, {"pose01"}};
+  const Fault second{
+      FaultName::odd_pose, "pose04: 2 px", "try --skip-poses pose04", Severity::doubt, {"pose04"}};
+  const Fault other{FaultName::defocus, "blurred", "focus"};
+  const std::vector<Fault> found = merged({first, other, second, second});
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].poses, (std::vector<std::string>{"pose01", "pose04"}));
+  EXPECT_EQ(found[0].severity, Severity::doubt);
+  EXPECT_EQ(to_text(found[0]),
+            "odd_pose in pose01, pose04: pose01: 3 px (and 2 more of the same kind); try --skip-poses "
+            "pose01,pose04.");
+  EXPECT_EQ(to_text(found[1]), "defocus: blurred; focus.");
 }
 
 TEST(Faults, BoardBent) {

@@ -77,7 +77,7 @@ Error explained(const Error& failure,
   if (faults.empty()) return failure;
   if (const auto written = calib::write_failed_report(failure.message, faults, options.out); !written)
     log_warning("{}", written.message());
-  return error("{}\n{}", failure.message, calib::to_text(faults));
+  return error("{}\n{}", failure.message, calib::to_text(calib::merged(faults)));
 }
 
 // Adds the faults that show when the rig is compared with the one that it replaces.
