@@ -101,6 +101,8 @@ Solution solution_at(const Parameters& parameters, const Noise& noise, int steps
   solution.rig.projectors = parameters.projectors;
   solution.world_from_board = parameters.world_from_board;
   solution.bend_m = parameters.bend_m;
+  solution.twist_m = parameters.twist_m;
+  solution.print = parameters.print;
   solution.noise = noise;
   solution.iterations = steps;
   return solution;
@@ -127,7 +129,7 @@ void add_residuals(const Observations& observations,
                    const Parameters& at,
                    const Noise& noise,
                    Solution* into) {
-  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+  const BoardShape shape = board_shape(observations, *into);
   const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const auto is_outlier = [](const Vector2d& r, double stddev) {
     return !(r.norm() < k_outlier_at * stddev);
@@ -142,7 +144,7 @@ void add_residuals(const Observations& observations,
     const Imager& camera = into->rig.cameras[static_cast<size_t>(seen.camera)];
     Vector2d px, r = none;
     if (pose && predict_corner(view(camera), *pose, shape, into->bend_m,
-                               observations.board.p_corner(seen.corner).head<2>(), &px))
+                               printed_corner(observations.board, into->print, seen.corner), &px))
       r = px - seen.px;
     into->corner_residuals.push_back(r);
     into->corner_outlier.push_back(is_outlier(r, noise.corner.total(seen.stddev_px)));
@@ -272,6 +274,8 @@ Parameters unknowns_of(const Solution& solution) {
   parameters.projectors = solution.rig.projectors;
   parameters.world_from_board = solution.world_from_board;
   parameters.bend_m = solution.bend_m;
+  parameters.twist_m = solution.twist_m;
+  parameters.print = solution.print;
   return parameters;
 }
 
@@ -347,15 +351,18 @@ Rig with_distortion_values(Rig rig) {
   return rig;
 }
 
-Solution with_distortion_unknown(const Observations& observations, Solution solution) {
+BoardShape board_shape(const Observations& observations, const Solution& solution) {
+  return {observations.board.width_m(), observations.board.height_m(), solution.twist_m};
+}
+
+Solution with_distortion_unknown(const Observations& observations, Solution solution, SolveOptions options) {
   const auto is_pinhole = [](const Imager& imager) { return imager.lens.model.value_count() == 4; };
   if (std::none_of(solution.rig.cameras.begin(), solution.rig.cameras.end(), is_pinhole) &&
       std::none_of(solution.rig.projectors.begin(), solution.rig.projectors.end(), is_pinhole))
     return solution;
   solution.rig = with_distortion_values(std::move(solution.rig));
-  SolveOptions options;
-  options.radial = k_pinhole_radial;
-  options.tangential = k_pinhole_tangential;
+  options.projector_radial = k_pinhole_radial;
+  options.projector_tangential = k_pinhole_tangential;
   solution.covariance =
       BundleAdjuster(observations, options).covariance(unknowns_of(solution), solution.noise);
   return solution;
@@ -383,8 +390,8 @@ std::optional<Vector2d> predicted(const Observations& observations,
   Vector2d px;
   if (!predict_match({camera.lens.model, camera.lens.values, camera.imager_from_world},
                      {projector.lens.model, projector.lens.values, projector.imager_from_world},
-                     world_from_board, {observations.board.width_m(), observations.board.height_m()},
-                     solution.bend_m, match.px_camera, &px))
+                     world_from_board, board_shape(observations, solution), solution.bend_m, match.px_camera,
+                     &px))
     return std::nullopt;
   return px;
 }
@@ -396,8 +403,7 @@ std::optional<Eigen::Vector3d> surface_point(const Observations& observations,
   const Imager& camera = solution.rig.cameras[static_cast<size_t>(match.camera)];
   Eigen::Vector3d p;
   if (!intersect_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, world_from_board,
-                       {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
-                       match.px_camera, &p))
+                       board_shape(observations, solution), solution.bend_m, match.px_camera, &p))
     return std::nullopt;
   return p;
 }
