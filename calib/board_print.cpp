@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr int k_least_degree = 2, k_most_degree = 4;
-constexpr double k_size = 0.003, k_shear = 0.0005;
+constexpr double k_shear = 0.0005;
 // Standard deviation of a polynomial of degree 2, 3 and 4: together 0.1 mm in each coordinate.
 constexpr std::array k_smooth_m = {0.04e-3, 0.03e-3, 0.02e-3};
 
@@ -108,10 +108,10 @@ Vector2d printed_corner(const Board& board, const Eigen::VectorXd& print, int co
   return p + print_modes(board, p) * print;
 }
 
-Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board) {
+Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board, double size) {
   Eigen::Matrix<double, k_print_modes, 1> stddevs;
-  stddevs[0] = k_size * board.width_m() / 2;
-  stddevs[1] = k_size * board.height_m() / 2;
+  stddevs[0] = size * board.width_m() / 2;
+  stddevs[1] = size * board.height_m() / 2;
   stddevs[2] = k_shear * board.height_m() / 2;
   int at = 3;
   for (int axis = 0; axis < 2; ++axis) {
@@ -121,6 +121,10 @@ Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board) {
     }
   }
   return stddevs;
+}
+
+Vector2d print_growth(const Board& board, const Eigen::VectorXd& print) {
+  return {2 * print[0] / board.width_m(), 2 * print[1] / board.height_m()};
 }
 
 PrintModes by_print(const Board& board) {

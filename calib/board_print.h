@@ -36,9 +36,12 @@ PrintModes print_modes(const Board& board, const Eigen::Vector2d& p_board);
 /// Where a corner is printed. An empty `print`: where the board's text has it.
 Eigen::Vector2d printed_corner(const Board& board, const Eigen::VectorXd& print, int corner);
 
-/// Prior standard deviations of the parameters: sizes within some thousandths, shear within 0.0005, smooth
-/// errors of 0.1 mm RMS, as office printers have them.
-Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board);
+/// Prior standard deviations of the parameters: width and height within the share `size`, shear within
+/// 0.0005, smooth errors of 0.1 mm RMS, as office printers have them.
+constexpr double k_print_size = 0.003;
+Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board, double size = k_print_size);
+/// By which share the print is wider (x) and higher (y) than the board's text.
+Eigen::Vector2d print_growth(const Board& board, const Eigen::VectorXd& print);
 
 /// Derivatives of the two measured lengths by the parameters; the lengths are means over the rows and columns
 /// of corners.

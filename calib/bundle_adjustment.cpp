@@ -266,7 +266,8 @@ BoardShape BundleAdjuster::shape(const Parameters& at) const {
 // The print's prior, and the lengths that were measured by hand.
 void BundleAdjuster::add_print_priors(const Parameters& at, NormalEquations* normal) const {
   const int at_print = board_at_ + 3;
-  const VectorXd weights = print_stddevs(observations_.board).cwiseInverse();
+  const double size = options_.print_size > 0 ? options_.print_size : k_print_size;
+  const VectorXd weights = print_stddevs(observations_.board, size).cwiseInverse();
   const VectorXd off = weights.cwiseProduct(at.print);
   normal->cost += off.squaredNorm() / 2;
   normal->devices.block<k_print_modes, k_print_modes>(at_print, at_print).diagonal() += weights.cwiseAbs2();
@@ -483,7 +484,9 @@ void BundleAdjuster::index_parameters(const Parameters& of) {
 Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
                                                          const Noise& noise,
                                                          double enough) {
-  if (options_.board_measured && start.print.size() == 0) start.print = VectorXd::Zero(k_print_modes);
+  const bool solves_print = options_.board_measured || options_.print_size > 0;
+  if (!solves_print) start.print.resize(0);
+  if (solves_print && start.print.size() == 0) start.print = VectorXd::Zero(k_print_modes);
   index_parameters(start);
   if (start.inverse_depths.size() != observations_.points.size()) place_points(&start);
 

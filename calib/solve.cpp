@@ -188,6 +188,7 @@ Result<Solution> rounds(const Observations& observations,
                       tie_point_level(observations, solution.tie_point_residuals)};
     if (is_last) {
       solution.noise = found;
+      solution.print_is_measured = options.board_measured.has_value();
       solution.covariance = joint.covariance(descent.parameters, found);
       break;
     }
@@ -291,6 +292,16 @@ Result<Parameters> unknowns_with_models(const Observations& observations,
   return parameters;
 }
 
+// fy / fx - 1 of camera 0, and its standard deviation.
+struct PixelAspect {
+  double value = 0, stddev = 0;
+};
+PixelAspect pixel_aspect(const Solution& solution) {
+  const Lens& lens = solution.rig.cameras[0].lens;
+  const Vector2d slope(-lens.fy() / (lens.fx() * lens.fx()), 1 / lens.fx());
+  return {lens.fy() / lens.fx() - 1, std::sqrt(slope.dot(solution.covariance.topLeftCorner<2, 2>() * slope))};
+}
+
 }  // namespace
 
 std::vector<std::string> lens_models(const Observations& observations, const SolveOptions& options) {
@@ -349,6 +360,22 @@ Rig with_distortion_values(Rig rig) {
     }
   }
   return rig;
+}
+
+double uneven_print(const Observations& observations, const SolveOptions& options, const Solution& solution) {
+  constexpr double k_least = 4e-4;               // less costs less than a tenth of a millimetre
+  constexpr double k_certain = 4, k_square = 3;  // standard deviations
+  const PixelAspect seen = pixel_aspect(solution);
+  if (options.board_measured || std::abs(seen.value) < std::max(k_least, k_certain * seen.stddev)) return 0;
+  SolveOptions free = options;
+  free.print_size = k_print_size;
+  const auto freed = solve_from(observations, free, solution);
+  if (!freed) return 0;
+  const PixelAspect pixels = pixel_aspect(*freed);
+  const bool is_known = k_certain * pixels.stddev < std::abs(seen.value);
+  if (!is_known || std::abs(pixels.value) > k_square * pixels.stddev + k_square_pixels) return 0;
+  const Vector2d growth = print_growth(observations.board, freed->print);
+  return std::abs(growth.x() - growth.y());
 }
 
 BoardShape board_shape(const Observations& observations, const Solution& solution) {

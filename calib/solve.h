@@ -24,6 +24,9 @@ struct SolveOptions {
   /// The print's measured size. When it is given, the print's errors are unknowns of the solve
   /// (calib/board_print.h); without it the board is as its text says.
   std::optional<BoardMeasured> board_measured = {};
+  /// Above 0: the print's errors are unknowns although nobody measured it, and its width and height differ
+  /// from its text by this share (standard deviation).
+  double print_size = 0;
   /// Whether the cameras' pixels are square to k_square_pixels. Sensors are; images that were stretched are
   /// not.
   bool square_pixels = false;
@@ -57,6 +60,7 @@ struct Solution {
   std::vector<std::optional<Pose>> world_from_board;  ///< for each pose; none where no camera saw the board
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
   double twist_m = 0;
+  bool print_is_measured = false;
   Eigen::VectorXd print;  ///< the print's errors (calib/board_print.h); empty where they were not solved
   std::vector<Eigen::Vector2d> corner_residuals, match_residuals;
   std::vector<bool> corner_outlier, match_outlier;  ///< beyond 4 standard deviations
@@ -105,6 +109,11 @@ Rig with_distortion_values(Rig rig);
 Solution with_distortion_unknown(const Observations& observations,
                                  Solution solution,
                                  SolveOptions options = {});
+
+/// By which share a print's width and height differ, where the observations show that the print is uneven and
+/// not camera 0's pixels; 0 otherwise. Boards that are rolled tell one from the other: what the pixels do
+/// stays with the image, what the print does turns with the board.
+double uneven_print(const Observations& observations, const SolveOptions& options, const Solution& solution);
 
 /// The shape of the board as solved.
 BoardShape board_shape(const Observations& observations, const Solution& solution);

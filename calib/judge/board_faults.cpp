@@ -79,18 +79,26 @@ double common_stretch(const Rig& rig) {
   return std::abs(low) < std::abs(high) ? low : high;
 }
 
-// A print that is uneven is a note: its errors are unknowns of the solve.
-void note_print(const Board& board, const Eigen::VectorXd& print, std::vector<Fault>* faults) {
-  constexpr double k_aspect = 5e-4, k_smooth_m = 0.05e-3;  // what prints on glass or aluminium keep
-  const double width = 2 * print[0] / board.width_m(), height = 2 * print[1] / board.height_m();
-  const double smooth = print.tail(print.size() - 3).norm() / std::sqrt(2.0);
-  if (std::abs(width - height) < k_aspect && smooth < k_smooth_m) return;
+// The errors of an uneven print are unknowns of the solve. Where its size was measured, nothing is left of
+// them; else its scale is as uncertain as the print is uneven.
+void note_print(const Board& board, const Solution& solution, std::vector<Fault>* faults) {
+  constexpr double k_aspect = 4e-4, k_smooth_m = 0.05e-3;  // what prints on glass or aluminium keep
+  const Vector2d growth = print_growth(board, solution.print);
+  const double smooth = solution.print.tail(solution.print.size() - 3).norm() / std::sqrt(2.0);
+  if (std::abs(growth.x() - growth.y()) < k_aspect && smooth < k_smooth_m) return;
   faults->push_back(
       {FaultName::uneven_print,
-       fmt::format("the print is {:+.2f} % wider and {:+.2f} % higher than the board's text; within that its "
-                   "corners are off by {:.2f} mm RMS",
-                   100 * width, 100 * height, 1e3 * smooth),
-       "this is part of the solve; a board made on glass or aluminium needs no correction", Severity::note});
+       fmt::format(
+           "the print's width and height differ from the board's text by {:+.2f} and {:+.2f} %, and its "
+           "corners from that by {:.2f} mm RMS{}",
+           100 * growth.x(), 100 * growth.y(), 1e3 * smooth,
+           solution.print_is_measured ? "" : "; how large it is follows from no observation"),
+       solution.print_is_measured
+           ? "this is part of the solve; a board made on glass or aluminium needs no correction"
+           : "measure from the first to the last inner corner, across and down, and give --board-measured; "
+             "or use a "
+             "board made on glass or aluminium",
+       solution.print_is_measured ? Severity::note : Severity::doubt});
 }
 
 }  // namespace
@@ -131,7 +139,7 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
              1e3 * bend, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(), 1e3 * solution.twist_m,
              1e3 * offsets.out_m),
          "glue the board onto glass, aluminium or honeycomb and hold it without pressing it"});
-  if (solution.print.size() > 0) note_print(observations.board, solution.print, &faults);
+  if (solution.print.size() > 0) note_print(observations.board, solution, &faults);
   const double stretch = common_stretch(solution.rig);
   const bool is_stretched = std::abs(stretch) > 0.01;
   if (is_stretched || (faults.empty() && offsets.across_m > allowed))

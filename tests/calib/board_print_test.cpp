@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -153,6 +154,40 @@ TEST(BoardPrint, LengthsMakeUpForABadPrint) {
     EXPECT_GT(share_within(ratios, 1), 0.85);  // four rigs
     EXPECT_GT(rms(without), 1.5 * rms(moved));
   }
+}
+
+TEST(BoardPrint, AnUnevenPrintShowsWithoutLengthsAndUnevenPixelsAreNotTakenForOne) {
+  std::mt19937_64 rng = test_rng();
+  std::vector<double> ratios, solved, exact;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Printed made = printed({.phase = 0.9 * seed}, seed, &rng);
+    const calib::Solution plain = calib::solve(made.observations).value();
+    const double uneven = calib::uneven_print(made.observations, {}, plain);
+    EXPECT_GT(uneven, 0.0006);  // 0.0015 by its size alone; the smooth errors grow it or shrink it
+    EXPECT_LT(uneven, 0.004);
+    const Judged with = judged(made, {.print_size = uneven, .square_pixels = true}, &rng);
+    for (const double e : with.landed.pooled_mm()) {
+      ratios.push_back(e / with.stated_mm);
+      solved.push_back(e);
+    }
+    for (const double e : judged(made, {}, &rng).landed.pooled_mm()) exact.push_back(e);
+    EXPECT_TRUE(std::any_of(with.assessment.faults.begin(), with.assessment.faults.end(),
+                            [](const calib::Fault& f) {
+                              return f.name == calib::FaultName::uneven_print &&
+                                     f.severity == calib::Severity::doubt;
+                            }))
+        << calib::to_text(with.assessment.faults);
+  }
+  printf("[ print    ] without lengths: %.3f mm RMS, as an exact board %.3f mm; stated holds for %.1f %%\n",
+         rms(solved), rms(exact), 100 * share_within(ratios, 1));
+  EXPECT_GT(share_within(ratios, 1), 0.9);
+  EXPECT_LT(rms(solved), rms(exact));
+
+  const TrueRig truth =
+      make_true_rig({.k1 = -0.05, .shift = 0.5, .seed = 5});  // its pixels are 0.13 % uneven
+  calib::Observations observations = observed_perfectly(truth, 4);
+  add_noise(0.015, 0.03, &rng, &observations);
+  EXPECT_EQ(calib::uneven_print(observations, {}, calib::solve(observations).value()), 0);
 }
 
 }  // namespace

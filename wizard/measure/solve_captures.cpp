@@ -67,6 +67,20 @@ Result<std::optional<calib::BoardMeasured>> measured_board(const calib::CaptureS
   return measured;
 }
 
+// Solves again with the print's errors as unknowns where the observations show that it is uneven.
+Status solve_uneven_print(const calib::Observations& observations,
+                          const SolveCommandOptions& options,
+                          calib::SolveOptions* solving,
+                          calib::ModelSelection* choice) {
+  if (options.pixels_not_square) return {};
+  solving->print_size = calib::uneven_print(observations, *solving, choice->solution);
+  if (solving->print_size == 0) return {};
+  solving->square_pixels = true;
+  LIMN_TRY(choice->solution, calib::solve_from(observations, *solving, choice->solution));
+  LIMN_TRY(choice->held_out, calib::cross_validate(observations, *solving, choice->solution));
+  return {};
+}
+
 // Measures the scale bars. A wrong length is a fault, and a rig with a fault of scale is never "good".
 Status check_lengths(const calib::CaptureSet& captures,
                      const std::vector<calib::ScaleBar>& lengths,
@@ -140,6 +154,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   auto choice = calib::solve_selecting_models(observed.observations, solving);
   if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
   solving = choice->options;
+  LIMN_TRY_STATUS(solve_uneven_print(observed.observations, options, &solving, &*choice));
   calib::Solution* const solution = &choice->solution;
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} iterations; measuring the held-out error", solution->iterations);

@@ -25,7 +25,7 @@ struct SolveCommandOptions {
   std::vector<std::string> scale_bar_lengths = {};
   /// The print's measured size, as calib/board_print.h reads it; empty: that of capture.json, if any.
   std::string board_measured = {};
-  /// Cameras' pixels may be not square (images that were stretched). It counts with a measured board alone.
+  /// Cameras' pixels may be not square (images that were stretched), so that no print is found to be uneven.
   bool pixels_not_square = false;
 };
 
