@@ -377,6 +377,15 @@ void add_solve(CLI::App& app, Run& run) {
                    "Scale bar: two markers and their measured distance, such as 'apriltag_36h11:3 "
                    "apriltag_36h11:7 250mm'; repeat the option for more")
       ->allow_extra_args(false);
+  command->add_option(
+      "--board-measured", options->board_measured,
+      "Measured size of the printed board, from its first to its last inner corner, across and down, with "
+      "the "
+      "uncertainty in mm: 225.2x149.9mm:0.05 (0.1 when absent). The print's errors are then solved, too");
+  command->add_flag(
+      "--pixels-not-square", options->pixels_not_square,
+      "The cameras' pixels may be not square: take an uneven print for uneven pixels, and do not "
+      "assume squares to 0.0001 with --board-measured");
   command->add_flag(
       "--cameras-only", options->cameras_only,
       "Solve the cameras alone, from photographs of the board (one for each pose: in one folder, or in "

@@ -46,7 +46,7 @@ bool is_finite(const Parameters& parameters) {
   for (const auto& board : parameters.world_from_board) {
     if (board && !board->is_finite()) return false;
   }
-  return parameters.bend_m.allFinite();
+  return parameters.bend_m.allFinite() && std::isfinite(parameters.twist_m) && parameters.print.allFinite();
 }
 
 }  // namespace
@@ -55,7 +55,6 @@ BundleAdjuster::BundleAdjuster(const Observations& observations, const SolveOpti
     : observations_(observations),
       options_(options),
       left_out_(left_out),
-      shape_{observations.board.width_m(), observations.board.height_m()},
       match_rays_(observations.matches.size()),
       point_rays_(observations.points.size()) {
   group_observations();
@@ -102,9 +101,11 @@ void BundleAdjuster::add_group(const Group& group,
   const bool is_match = group.projector >= 0;
   const Imager* projector = is_match ? &at.projectors[static_cast<size_t>(group.projector)] : nullptr;
   const ImagerView camera_view = view(camera);
-  // Columns: camera values, camera pose, bend, projector values, projector pose; the board's pose last.
+  const BoardShape bent = shape(at);
+  // Columns: camera values, camera pose, board, projector values, projector pose; the board's pose last.
   const int n = value_count(camera), m = is_match ? value_count(*projector) : 0;
-  const int board_at = n + 8 + (is_match ? m + 6 : 0), columns = board_at + 6;
+  const int projector_column = n + 6 + board_count_;
+  const int board_at = projector_column + (is_match ? m + 6 : 0), columns = board_at + 6;
   MatrixXd rows = MatrixXd::Zero(static_cast<Eigen::Index>(2 * group.members.size()), columns);
   VectorXd residuals = VectorXd::Zero(rows.rows());
   Derivatives d;
@@ -118,13 +119,13 @@ void BundleAdjuster::add_group(const Group& group,
       measured = match.px_projector;
       stddev = noise.match.total(match.stddev_px);
       seen = find_ray(camera.lens.model, camera.lens.values, match.px_camera, true, &ray) &&
-             predict_match(camera_view, view(*projector), *board, shape_, at.bend_m, ray, &px, &d);
+             predict_match(camera_view, view(*projector), *board, bent, at.bend_m, ray, &px, &d);
     } else {
       const CornerObservation& corner = observations_.corners[group.members[i]];
-      const Vector2d p_board = observations_.board.p_corner(corner.corner).head<2>();
+      const Vector2d p_board = printed_corner(observations_.board, at.print, corner.corner);
       measured = corner.px;
       stddev = noise.corner.total(corner.stddev_px);
-      seen = predict_corner(camera_view, *board, shape_, at.bend_m, p_board, &px, &d);
+      seen = predict_corner(camera_view, *board, bent, at.bend_m, p_board, &px, &d);
     }
     if (!seen) {
       robust_weight(k_unseen * k_unseen, normal);
@@ -138,9 +139,15 @@ void BundleAdjuster::add_group(const Group& group,
     rows.block(row, 0, 2, n) = factor * d.camera_values;
     rows.block<2, 6>(row, n) = factor * d.camera_pose;
     rows.block<2, 2>(row, n + 6) = factor * d.bend;
+    rows.block<2, 1>(row, n + 8) = factor * d.twist;
+    if (!is_match && board_count_ > 3)
+      rows.block<2, k_print_modes>(row, n + 9) =
+          factor * d.board_xy *
+          print_modes(observations_.board,
+                      observations_.board.p_corner(observations_.corners[group.members[i]].corner).head<2>());
     if (is_match) {
-      rows.block(row, n + 8, 2, m) = factor * d.projector_values;
-      rows.block<2, 6>(row, n + 8 + m) = factor * d.projector_pose;
+      rows.block(row, projector_column, 2, m) = factor * d.projector_values;
+      rows.block<2, 6>(row, projector_column + m) = factor * d.projector_pose;
     }
     rows.block<2, 6>(row, board_at) = factor * d.board_pose;
   }
@@ -152,8 +159,10 @@ void BundleAdjuster::add_group(const Group& group,
   struct Part {
     int from, to, size;
   };
-  std::vector<Part> parts = {{0, camera_at_[static_cast<size_t>(group.camera)], n + 6}, {n + 6, bend_at_, 2}};
-  if (is_match) parts.push_back({n + 8, projector_at_[static_cast<size_t>(group.projector)], m + 6});
+  std::vector<Part> parts = {{0, camera_at_[static_cast<size_t>(group.camera)], n + 6},
+                             {n + 6, board_at_, board_count_}};
+  if (is_match)
+    parts.push_back({projector_column, projector_at_[static_cast<size_t>(group.projector)], m + 6});
   Eliminated& own = normal->boards[static_cast<size_t>(group.pose)];
   for (const Part& a : parts) {
     for (const Part& b : parts) {
@@ -238,28 +247,57 @@ void BundleAdjuster::add_lens_prior(const Imager& imager,
       (is_projector ? options_.projector_centre : options_.camera_centre) * imager.width);
   if (!is_projector) add(3, (imager.height - 1) / 2.0, options_.camera_centre * imager.width);
   for (int i = 4; i < value_count(imager); ++i)
-    add(i, 0, is_tangential(i) ? options_.tangential : options_.radial);
+    add(i, 0,
+        is_tangential(i) ? (is_projector ? options_.projector_tangential : options_.tangential)
+                         : (is_projector ? options_.projector_radial : options_.radial));
   const double fx = imager.lens.fx(), fy = imager.lens.fy();
-  const double residual = std::log(std::abs(fy / fx)) / options_.aspect;
-  const Vector2d slope(-1 / (fx * options_.aspect), 1 / (fy * options_.aspect));
+  const double stddev = !is_projector && options_.square_pixels ? k_square_pixels : options_.aspect;
+  const double residual = std::log(std::abs(fy / fx)) / stddev;
+  const Vector2d slope(-1 / (fx * stddev), 1 / (fy * stddev));
   normal->cost += residual * residual / 2;
   normal->devices.block<2, 2>(at, at) += slope * slope.transpose();
   normal->gradient.segment<2>(at) += residual * slope;
+}
+
+BoardShape BundleAdjuster::shape(const Parameters& at) const {
+  return {observations_.board.width_m(), observations_.board.height_m(), at.twist_m};
+}
+
+// The print's prior, and the lengths that were measured by hand.
+void BundleAdjuster::add_print_priors(const Parameters& at, NormalEquations* normal) const {
+  const int at_print = board_at_ + 3;
+  const double size = options_.print_size > 0 ? options_.print_size : k_print_size;
+  const VectorXd weights = print_stddevs(observations_.board, size).cwiseInverse();
+  const VectorXd off = weights.cwiseProduct(at.print);
+  normal->cost += off.squaredNorm() / 2;
+  normal->devices.block<k_print_modes, k_print_modes>(at_print, at_print).diagonal() += weights.cwiseAbs2();
+  normal->gradient.segment<k_print_modes>(at_print) += weights.cwiseProduct(off);
+  if (!options_.board_measured) return;
+  const BoardMeasured& measured = *options_.board_measured;
+  const PrintModes by = by_print(observations_.board) / measured.stddev_m;
+  const Vector2d residual =
+      by * at.print + (nominal_lengths(observations_.board) - Vector2d(measured.width_m, measured.height_m)) /
+                          measured.stddev_m;
+  normal->cost += residual.squaredNorm() / 2;
+  normal->devices.block<k_print_modes, k_print_modes>(at_print, at_print) += by.transpose() * by;
+  normal->gradient.segment<k_print_modes>(at_print) += by.transpose() * residual;
 }
 
 void BundleAdjuster::add_priors(const Parameters& at, NormalEquations* normal) const {
   for (size_t i = 0; i < at.cameras.size(); ++i) add_lens_prior(at.cameras[i], false, camera_at_[i], normal);
   for (size_t i = 0; i < at.projectors.size(); ++i)
     add_lens_prior(at.projectors[i], true, projector_at_[i], normal);
-  const double weight = 1 / (options_.bend_share * shape_.width_m);
-  normal->cost += at.bend_m.squaredNorm() * weight * weight / 2;
-  normal->devices.block<2, 2>(bend_at_, bend_at_).diagonal().array() += weight * weight;
-  normal->gradient.segment<2>(bend_at_) += weight * weight * at.bend_m;
+  const double weight = 1 / (options_.bend_share * observations_.board.width_m());
+  const Vector3d bends(at.bend_m.x(), at.bend_m.y(), at.twist_m);
+  normal->cost += bends.squaredNorm() * weight * weight / 2;
+  normal->devices.block<3, 3>(board_at_, board_at_).diagonal().array() += weight * weight;
+  normal->gradient.segment<3>(board_at_) += weight * weight * bends;
+  if (at.print.size() > 0) add_print_priors(at, normal);
 }
 
 BundleAdjuster::NormalEquations BundleAdjuster::evaluate(const Parameters& at, const Noise& noise) {
   NormalEquations normal;
-  const int size = bend_at_ + 2;
+  const int size = board_at_ + board_count_;
   normal.cost = 0;
   normal.devices = MatrixXd::Zero(size, size);
   normal.gradient = VectorXd::Zero(size);
@@ -354,7 +392,9 @@ Parameters BundleAdjuster::moved(const Parameters& from, const Step& step) const
     if (i == 0) to.cameras[i].imager_from_world = pose;  // it defines the world and is not even rounded
   }
   for (size_t i = 0; i < to.projectors.size(); ++i) move(&to.projectors[i], projector_at_[i]);
-  to.bend_m += step.devices.segment<2>(bend_at_);
+  to.bend_m += step.devices.segment<2>(board_at_);
+  to.twist_m += step.devices(board_at_ + 2);
+  if (to.print.size() > 0) to.print += step.devices.segment<k_print_modes>(board_at_ + 3);
   for (size_t i = 0; i < to.world_from_board.size(); ++i) {
     if (to.world_from_board[i])
       to.world_from_board[i] = boxplus(*to.world_from_board[i], Vector6d(step.boards[i]));
@@ -434,15 +474,19 @@ void BundleAdjuster::index_parameters(const Parameters& of) {
     projector_at_.push_back(size);
     size += value_count(projector) + 6;
   }
-  bend_at_ = size;
-  free_.assign(static_cast<size_t>(size) + 2, true);
+  board_at_ = size;
+  board_count_ = 3 + static_cast<int>(of.print.size());
+  free_.assign(static_cast<size_t>(size + board_count_), true);
   for (int i = 0; i < 6; ++i) free_[static_cast<size_t>(value_count(of.cameras[0]) + i)] = false;
-  if (!options_.bend) free_[static_cast<size_t>(size)] = free_[static_cast<size_t>(size) + 1] = false;
+  if (!options_.bend) std::fill_n(free_.begin() + size, 3, false);
 }
 
 Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
                                                          const Noise& noise,
                                                          double enough) {
+  const bool solves_print = options_.board_measured || options_.print_size > 0;
+  if (!solves_print) start.print.resize(0);
+  if (solves_print && start.print.size() == 0) start.print = VectorXd::Zero(k_print_modes);
   index_parameters(start);
   if (start.inverse_depths.size() != observations_.points.size()) place_points(&start);
 
@@ -486,12 +530,12 @@ MatrixXd BundleAdjuster::covariance(Parameters at, const Noise& noise) {
   MatrixXd inverse = scale.asDiagonal() *
                      scaled.ldlt().solve(MatrixXd::Identity(schur.rows(), schur.cols())) * scale.asDiagonal();
   const double robust = normal.weight * normal.slope / std::max(normal.curvature * normal.curvature, 1e-300);
-  for (int i = 0; i < bend_at_; ++i) {
+  for (int i = 0; i < board_at_; ++i) {
     if (free_[static_cast<size_t>(i)]) continue;
     inverse.row(i).setZero();
     inverse.col(i).setZero();
   }
-  return robust * inverse.topLeftCorner(bend_at_, bend_at_);
+  return robust * inverse.topLeftCorner(board_at_, board_at_);
 }
 
 // One placement of the board by its corners, for minimise().
@@ -520,8 +564,8 @@ struct BundleAdjuster::BoardProblem {
       const Imager& camera = at.cameras[static_cast<size_t>(corner.camera)];
       const double stddev = noise.corner.total(corner.stddev_px);
       Vector2d px;
-      if (!predict_corner(view(camera), world_from_board, joint.shape_, at.bend_m,
-                          joint.observations_.board.p_corner(corner.corner).head<2>(), &px, &d)) {
+      if (!predict_corner(view(camera), world_from_board, joint.shape(at), at.bend_m,
+                          printed_corner(joint.observations_.board, at.print, corner.corner), &px, &d)) {
         joint.robust_weight(k_unseen * k_unseen, &robust);
         continue;
       }

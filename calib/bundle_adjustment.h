@@ -20,6 +20,8 @@ struct Parameters {
   std::vector<Imager> cameras, projectors;
   std::vector<std::optional<Pose>> world_from_board;  ///< none: no camera saw the board
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
+  double twist_m = 0;
+  Eigen::VectorXd print = {};  ///< empty: the board is as its text says
   /// Inverse depths of the tie points, along z of their camera's rays, 1/m; 0: the point is not used.
   std::vector<double> inverse_depths;
 };
@@ -68,7 +70,7 @@ class BundleAdjuster {
   };
   struct NormalEquations {
     double cost = std::numeric_limits<double>::infinity();
-    Eigen::MatrixXd devices;  // the devices' parameters, then the bend; lower half
+    Eigen::MatrixXd devices;  // the devices' parameters, then the board's; lower half
     Eigen::VectorXd gradient;
     std::vector<Eliminated> boards, points;
     // Sums over coordinates of the weights, of the loss's curvatures and of its squared slopes.
@@ -88,6 +90,8 @@ class BundleAdjuster {
   NormalEquations evaluate(const Parameters& at, const Noise& noise);
   void add_group(const Group& group, const Parameters& at, const Noise& noise, NormalEquations* normal);
   void add_points(const Parameters& at, const Noise& noise, NormalEquations* normal);
+  BoardShape shape(const Parameters& at) const;
+  void add_print_priors(const Parameters& at, NormalEquations* normal) const;
   void add_priors(const Parameters& at, NormalEquations* normal) const;
   void add_lens_prior(const Imager& imager, bool is_projector, int at, NormalEquations* normal) const;
   double robust_weight(double squared, NormalEquations* normal) const;
@@ -99,11 +103,11 @@ class BundleAdjuster {
   const Observations& observations_;
   const SolveOptions& options_;
   int left_out_;
-  BoardShape shape_;
   std::vector<Group> groups_;
   std::vector<int> camera_at_, projector_at_;  // first index of a device's values among the parameters
-  int bend_at_ = 0;
-  std::vector<bool> free_;                        // whether each device parameter, and the bend, is free
+  // First index and number of the board's parameters: bend, twist, print.
+  int board_at_ = 0, board_count_ = 3;
+  std::vector<bool> free_;                        // whether each of these parameters is free
   std::vector<LensRay> match_rays_, point_rays_;  // the last rays; the next search starts there
 };
 

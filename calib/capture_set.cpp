@@ -229,6 +229,19 @@ Status make_white_and_black(CaptureSet* captures) {
   return {};
 }
 
+std::optional<BoardMeasured> read_board_measured(const ConfigNode& root) {
+  const auto lengths = root.find("board_measured_mm"), stddev = root.find("board_measured_stddev_mm");
+  if (!lengths) return std::nullopt;
+  const std::vector<double> mm = lengths->numbers(2);
+  if (mm.size() != 2) return std::nullopt;
+  for (const double length : mm) {
+    if (!(length > 0)) lengths->problem("expected two lengths above 0 mm, [width, height].");
+  }
+  constexpr double k_most_stddev_mm = 5;
+  return BoardMeasured{1e-3 * mm[0], 1e-3 * mm[1],
+                       1e-3 * (stddev ? stddev->positive(k_most_stddev_mm) : 0.1)};
+}
+
 }  // namespace
 
 CaptureSet plan_captures(const fs::path& folder,
@@ -252,7 +265,8 @@ Result<CaptureSet> load_captures(const fs::path& folder, const std::vector<std::
   const fs::path path = folder / "capture.json";
   LIMN_TRY(const Config config, Config::load(path, "limn.capture/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "cameras", "projectors", "board", "patterns", "known_lengths"});
+  root.only({"schema", "cameras", "projectors", "board", "patterns", "known_lengths", "board_measured_mm",
+             "board_measured_stddev_mm"});
   CaptureSet captures;
   captures.folder = folder;
   captures.cameras = read_devices(root.at("cameras"), {"name", "size"});
@@ -261,6 +275,7 @@ Result<CaptureSet> load_captures(const fs::path& folder, const std::vector<std::
   if (const auto lengths = root.find("known_lengths")) {
     for (const ConfigNode& length : lengths->items()) captures.scale_bar_lengths.push_back(length.text());
   }
+  captures.board_measured = read_board_measured(root);
   LIMN_TRY_STATUS(config.status());
   auto parsed = Board::parse(board);
   if (!parsed) return error("{}: board: {}", path.string(), parsed.message());

@@ -2,10 +2,12 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/board/board.h"
+#include "calib/board_print.h"
 #include "calib/code/patterns.h"
 #include "core/result.h"
 
@@ -35,6 +37,8 @@ struct CaptureSet {
   std::vector<CapturedPose> poses;  ///< sorted by name
   /// Lengths measured by hand, as calib/judge/scale_bar.h reads them; "scale_bar_lengths" in capture.json.
   std::vector<std::string> scale_bar_lengths = {};
+  /// "board_measured_mm" and "board_measured_stddev_mm" in capture.json.
+  std::optional<BoardMeasured> board_measured = {};
   /// Keeps images that an import computed (white and black of series that lack them) as long as this exists.
   std::shared_ptr<const void> made_images = {};
 };

@@ -80,13 +80,14 @@ void score_corners(const Observations& observations, const Solution& left, int p
                           world_from_board.message());
     return;
   }
-  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+  const BoardShape shape = board_shape(observations, left);
   for (const CornerObservation& corner : observations.corners) {
     if (corner.pose != pose || gives_pose(observations.board, corner.corner)) continue;
     const Imager& camera = left.rig.cameras[static_cast<size_t>(corner.camera)];
     Vector2d px;
     if (!predict_corner({camera.lens.model, camera.lens.values, camera.imager_from_world}, *world_from_board,
-                        shape, left.bend_m, observations.board.p_corner(corner.corner).head<2>(), &px))
+                        shape, left.bend_m, printed_corner(observations.board, left.print, corner.corner),
+                        &px))
       continue;
     score->squared += (px - corner.px).squaredNorm();
     ++score->cells;

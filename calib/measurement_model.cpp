@@ -87,11 +87,18 @@ bool refine_ray(const LensModel& model,
 
 }  // namespace
 
-double BoardShape::z(const Vector2d& bend, double x, double y) const { return bend.dot(per_bend(x, y)); }
+double BoardShape::z(const Vector2d& bend, double x, double y) const {
+  return bend.dot(per_bend(x, y)) + twist_m * per_twist(x, y);
+}
+
+double BoardShape::per_twist(double x, double y) const {
+  return (2 * x / width_m - 1) * (2 * y / height_m - 1);
+}
 
 Vector2d BoardShape::slope(const Vector2d& bend, double x, double y) const {
   const double xr = 2 * x / width_m - 1, yr = 2 * y / height_m - 1;
-  return {-4 * bend.x() * xr / width_m, -4 * bend.y() * yr / height_m};
+  return {(-4 * bend.x() * xr + 2 * twist_m * yr) / width_m,
+          (-4 * bend.y() * yr + 2 * twist_m * xr) / height_m};
 }
 
 Vector2d BoardShape::per_bend(double x, double y) const {
@@ -119,8 +126,11 @@ bool predict_corner(const ImagerView& camera,
   const Matrix23 by_world = by_p * camera.imager_from_world.rotation_matrix();
   derivatives->camera_pose = by_p * moved_by_pose(arm_camera);
   derivatives->board_pose = by_world * moved_by_pose(arm_board);
-  derivatives->bend =
-      by_world * (world_from_board.rotation * Vector3d::UnitZ()) * shape.per_bend(x, y).transpose();
+  const Vector2d by_height = by_world * (world_from_board.rotation * Vector3d::UnitZ());
+  derivatives->bend = by_height * shape.per_bend(x, y).transpose();
+  derivatives->twist = by_height * shape.per_twist(x, y);
+  derivatives->board_xy = (by_world * world_from_board.rotation_matrix()).leftCols<2>() +
+                          by_height * shape.slope(bend, x, y).transpose();
   return true;
 }
 
@@ -208,6 +218,7 @@ bool predict_match(const ImagerView& camera,
   const Vector2d by_distance = by_world * d_world / rate;
   derivatives->board_pose = by_distance * (n_world.transpose() * moved_by_pose(arm_board));
   derivatives->bend = by_distance * shape.per_bend(hit.p_board.x(), hit.p_board.y()).transpose();
+  derivatives->twist = by_distance * shape.per_twist(hit.p_board.x(), hit.p_board.y());
   return true;
 }
 

@@ -8,16 +8,20 @@
 
 namespace limn::calib {
 
-/// The shape of a nearly flat board: two parabolas, as in mrcal. Height (m, along the board's z) of the
-/// sheet at (x, y): bend.x (1 - xr^2) + bend.y (1 - yr^2), where xr and yr run from -1 to 1 over the squares.
+/// The shape of a nearly flat board: two parabolas, as in mrcal, and a twist. Height (m, along the board's z)
+/// of the sheet at (x, y): bend.x (1 - xr^2) + bend.y (1 - yr^2) + twist xr yr, where xr and yr run from -1
+/// to 1 over the squares.
 struct BoardShape {
   double width_m = 1;
   double height_m = 1;
+  double twist_m = 0;
   double z(const Eigen::Vector2d& bend, double x, double y) const;
   /// (dz/dx, dz/dy)
   Eigen::Vector2d slope(const Eigen::Vector2d& bend, double x, double y) const;
   /// (dz/dbend.x, dz/dbend.y)
   Eigen::Vector2d per_bend(double x, double y) const;
+  /// dz/dtwist
+  double per_twist(double x, double y) const;
 };
 
 /// An imager's parameters, borrowed from the caller.
@@ -54,6 +58,8 @@ struct Derivatives {
   Values camera_values, projector_values;
   Pose6 camera_pose, projector_pose, board_pose;
   Eigen::Matrix2d bend;
+  Eigen::Vector2d twist;
+  Eigen::Matrix2d board_xy;  ///< by the board's point, predict_corner() alone
 };
 
 /// Predicts the camera pixel of the board's point (x, y). False when it has none (behind the camera).

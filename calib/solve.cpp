@@ -101,6 +101,8 @@ Solution solution_at(const Parameters& parameters, const Noise& noise, int steps
   solution.rig.projectors = parameters.projectors;
   solution.world_from_board = parameters.world_from_board;
   solution.bend_m = parameters.bend_m;
+  solution.twist_m = parameters.twist_m;
+  solution.print = parameters.print;
   solution.noise = noise;
   solution.iterations = steps;
   return solution;
@@ -127,7 +129,7 @@ void add_residuals(const Observations& observations,
                    const Parameters& at,
                    const Noise& noise,
                    Solution* into) {
-  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+  const BoardShape shape = board_shape(observations, *into);
   const Vector2d none = Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   const auto is_outlier = [](const Vector2d& r, double stddev) {
     return !(r.norm() < k_outlier_at * stddev);
@@ -142,7 +144,7 @@ void add_residuals(const Observations& observations,
     const Imager& camera = into->rig.cameras[static_cast<size_t>(seen.camera)];
     Vector2d px, r = none;
     if (pose && predict_corner(view(camera), *pose, shape, into->bend_m,
-                               observations.board.p_corner(seen.corner).head<2>(), &px))
+                               printed_corner(observations.board, into->print, seen.corner), &px))
       r = px - seen.px;
     into->corner_residuals.push_back(r);
     into->corner_outlier.push_back(is_outlier(r, noise.corner.total(seen.stddev_px)));
@@ -186,6 +188,7 @@ Result<Solution> rounds(const Observations& observations,
                       tie_point_level(observations, solution.tie_point_residuals)};
     if (is_last) {
       solution.noise = found;
+      solution.print_is_measured = options.board_measured.has_value();
       solution.covariance = joint.covariance(descent.parameters, found);
       break;
     }
@@ -272,6 +275,8 @@ Parameters unknowns_of(const Solution& solution) {
   parameters.projectors = solution.rig.projectors;
   parameters.world_from_board = solution.world_from_board;
   parameters.bend_m = solution.bend_m;
+  parameters.twist_m = solution.twist_m;
+  parameters.print = solution.print;
   return parameters;
 }
 
@@ -285,6 +290,16 @@ Result<Parameters> unknowns_with_models(const Observations& observations,
   for (size_t i = 0; i < parameters.projectors.size(); ++i)
     parameters.projectors[i].lens = with_model(parameters.projectors[i].lens, models.projectors[i]);
   return parameters;
+}
+
+// fy / fx - 1 of camera 0, and its standard deviation.
+struct PixelAspect {
+  double value = 0, stddev = 0;
+};
+PixelAspect pixel_aspect(const Solution& solution) {
+  const Lens& lens = solution.rig.cameras[0].lens;
+  const Vector2d slope(-lens.fy() / (lens.fx() * lens.fx()), 1 / lens.fx());
+  return {lens.fy() / lens.fx() - 1, std::sqrt(slope.dot(solution.covariance.topLeftCorner<2, 2>() * slope))};
 }
 
 }  // namespace
@@ -347,15 +362,34 @@ Rig with_distortion_values(Rig rig) {
   return rig;
 }
 
-Solution with_distortion_unknown(const Observations& observations, Solution solution) {
+double uneven_print(const Observations& observations, const SolveOptions& options, const Solution& solution) {
+  constexpr double k_least = 4e-4;               // less costs less than a tenth of a millimetre
+  constexpr double k_certain = 4, k_square = 3;  // standard deviations
+  const PixelAspect seen = pixel_aspect(solution);
+  if (options.board_measured || std::abs(seen.value) < std::max(k_least, k_certain * seen.stddev)) return 0;
+  SolveOptions free = options;
+  free.print_size = k_print_size;
+  const auto freed = solve_from(observations, free, solution);
+  if (!freed) return 0;
+  const PixelAspect pixels = pixel_aspect(*freed);
+  const bool is_known = k_certain * pixels.stddev < std::abs(seen.value);
+  if (!is_known || std::abs(pixels.value) > k_square * pixels.stddev + k_square_pixels) return 0;
+  const Vector2d growth = print_growth(observations.board, freed->print);
+  return std::abs(growth.x() - growth.y());
+}
+
+BoardShape board_shape(const Observations& observations, const Solution& solution) {
+  return {observations.board.width_m(), observations.board.height_m(), solution.twist_m};
+}
+
+Solution with_distortion_unknown(const Observations& observations, Solution solution, SolveOptions options) {
   const auto is_pinhole = [](const Imager& imager) { return imager.lens.model.value_count() == 4; };
   if (std::none_of(solution.rig.cameras.begin(), solution.rig.cameras.end(), is_pinhole) &&
       std::none_of(solution.rig.projectors.begin(), solution.rig.projectors.end(), is_pinhole))
     return solution;
   solution.rig = with_distortion_values(std::move(solution.rig));
-  SolveOptions options;
-  options.radial = k_pinhole_radial;
-  options.tangential = k_pinhole_tangential;
+  options.projector_radial = k_pinhole_radial;
+  options.projector_tangential = k_pinhole_tangential;
   solution.covariance =
       BundleAdjuster(observations, options).covariance(unknowns_of(solution), solution.noise);
   return solution;
@@ -383,8 +417,8 @@ std::optional<Vector2d> predicted(const Observations& observations,
   Vector2d px;
   if (!predict_match({camera.lens.model, camera.lens.values, camera.imager_from_world},
                      {projector.lens.model, projector.lens.values, projector.imager_from_world},
-                     world_from_board, {observations.board.width_m(), observations.board.height_m()},
-                     solution.bend_m, match.px_camera, &px))
+                     world_from_board, board_shape(observations, solution), solution.bend_m, match.px_camera,
+                     &px))
     return std::nullopt;
   return px;
 }
@@ -396,8 +430,7 @@ std::optional<Eigen::Vector3d> surface_point(const Observations& observations,
   const Imager& camera = solution.rig.cameras[static_cast<size_t>(match.camera)];
   Eigen::Vector3d p;
   if (!intersect_board({camera.lens.model, camera.lens.values, camera.imager_from_world}, world_from_board,
-                       {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
-                       match.px_camera, &p))
+                       board_shape(observations, solution), solution.bend_m, match.px_camera, &p))
     return std::nullopt;
   return p;
 }

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/board_print.h"
 #include "calib/measurement_model.h"
 #include "calib/noise.h"
 #include "calib/observations.h"
@@ -20,7 +21,16 @@ struct SolveOptions {
   std::string projector_model = "LENSMODEL_OPENCV4";
   /// One name for each camera, then for each projector, used instead of the two above when not empty.
   std::vector<std::string> lens_models = {};
-  /// Whether the board may be bent (two parameters, shared by all poses).
+  /// The print's measured size. When it is given, the print's errors are unknowns of the solve
+  /// (calib/board_print.h); without it the board is as its text says.
+  std::optional<BoardMeasured> board_measured = {};
+  /// Above 0: the print's errors are unknowns although nobody measured it, and its width and height differ
+  /// from its text by this share (standard deviation).
+  double print_size = 0;
+  /// Whether the cameras' pixels are square to k_square_pixels. Sensors are; images that were stretched are
+  /// not.
+  bool square_pixels = false;
+  /// Whether the board may be bent (three parameters, shared by all poses).
   bool bend = true;
   /// Residuals beyond this many standard deviations are down-weighted (Cauchy).
   double robust_at = 2;
@@ -31,12 +41,17 @@ struct SolveOptions {
   double projector_centre = 0.25;
   /// Deviation of fy / fx from 1: pixels are square to well below this.
   double aspect = 0.003;
-  /// Radial and tangential distortion values, from 0.
+  /// Radial and tangential distortion values, from 0: those of cameras and of projectors.
   double radial = 0.5;
   double tangential = 0.02;
+  double projector_radial = 0.5;
+  double projector_tangential = 0.02;
   /// The board's bend from 0, as a share of its width.
   double bend_share = 0.01;
 };
+
+/// Standard deviation of fy / fx - 1 of sensors.
+constexpr double k_square_pixels = 1e-4;
 
 /// The result of a solve. The rig's world frame is camera 0's. Residual arrays run parallel to the
 /// observations' arrays: predicted minus measured pixel; NaN where the observation has no prediction.
@@ -44,6 +59,9 @@ struct Solution {
   Rig rig;
   std::vector<std::optional<Pose>> world_from_board;  ///< for each pose; none where no camera saw the board
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
+  double twist_m = 0;
+  bool print_is_measured = false;
+  Eigen::VectorXd print;  ///< the print's errors (calib/board_print.h); empty where they were not solved
   std::vector<Eigen::Vector2d> corner_residuals, match_residuals;
   std::vector<bool> corner_outlier, match_outlier;  ///< beyond 4 standard deviations
   /// Positions of the tie points, m, world frame; none where no observation determines the depth.
@@ -53,8 +71,8 @@ struct Solution {
   double corner_scatter_px = 0;  ///< how the corners' residuals scatter: one coordinate, by the median
   int iterations = 0;
   /// Covariance of the devices' parameters, from the final Jacobian (robust weights and priors included),
-  /// board poses and bend marginalised. Order: camera 0's values and pose (boxplus's perturbation), camera
-  /// 1's …, then the projectors'. Camera 0's pose defines the world: its entries are zero.
+  /// board poses, shape and print marginalised. Order: camera 0's values and pose (boxplus's perturbation),
+  /// camera 1's …, then the projectors'. Camera 0's pose defines the world: its entries are zero.
   Eigen::MatrixXd covariance;
   /// First index of a projector's values in `covariance`.
   int projector_at(size_t projector) const;
@@ -87,8 +105,18 @@ Rig with_distortion_values(Rig rig);
 
 /// The same solution, with these lenses and with the covariance of their distortion. A pinhole lens is chosen
 /// where the observations show no distortion; how much there may be nevertheless is part of what is not
-/// known. The prior is that of lenses that pass as pinholes, not that of SolveOptions.
-Solution with_distortion_unknown(const Observations& observations, Solution solution);
+/// known. The prior of these is that of lenses that pass as pinholes.
+Solution with_distortion_unknown(const Observations& observations,
+                                 Solution solution,
+                                 SolveOptions options = {});
+
+/// By which share a print's width and height differ, where the observations show that the print is uneven and
+/// not camera 0's pixels; 0 otherwise. Boards that are rolled tell one from the other: what the pixels do
+/// stays with the image, what the print does turns with the board.
+double uneven_print(const Observations& observations, const SolveOptions& options, const Solution& solution);
+
+/// The shape of the board as solved.
+BoardShape board_shape(const Observations& observations, const Solution& solution);
 
 /// Estimates the pose of one placement of the board from the corners that cameras see, everything else as in
 /// `solution`.

@@ -155,7 +155,10 @@ void add_faults(const std::vector<Fault>& faults, Assessment* assessment) {
   if (severity == Severity::doubt) assessment->verdict = std::max(assessment->verdict, Verdict::usable);
 }
 
-Assessment assess(const Observed& observed, const Solution& solution, CrossValidation held_out) {
+Assessment assess(const Observed& observed,
+                  const Solution& solution,
+                  CrossValidation held_out,
+                  const SolveOptions& options) {
   const Observations& observations = observed.observations;
   Assessment assessment;
   assessment.held_out = std::move(held_out);
@@ -164,7 +167,7 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
     judge_cameras(observed, solution, &assessment);
     return assessment;
   }
-  const Solution judged = with_distortion_unknown(observations, solution);
+  const Solution judged = with_distortion_unknown(observations, solution, options);
   std::vector<Rig> without;
   for (const Rig& rig : assessment.held_out.rigs) without.push_back(with_distortion_values(rig));
   const Uncertainty uncertainty = estimated_uncertainty(observations, judged, without);
@@ -204,7 +207,7 @@ Assessment assess(const Observed& observed, const Solution& solution, CrossValid
 
 Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution) {
   LIMN_TRY(CrossValidation score, cross_validate(observed.observations, options, solution));
-  return assess(observed, solution, std::move(score));
+  return assess(observed, solution, std::move(score), options);
 }
 
 }  // namespace limn::calib

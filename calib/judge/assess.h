@@ -70,7 +70,10 @@ constexpr double k_beyond_boards = 5, k_fine_mm = 0.25;
 void add_faults(const std::vector<Fault>& faults, Assessment* assessment);
 
 /// `held_out`: cross-validation of the same solution, with its errors on the boards.
-Assessment assess(const Observed& observed, const Solution& solution, CrossValidation held_out);
+Assessment assess(const Observed& observed,
+                  const Solution& solution,
+                  CrossValidation held_out,
+                  const SolveOptions& options = {});
 
 /// Runs the cross-validation first. Errors: those of cross_validate().
 Result<Assessment> assess(const Observed& observed, const SolveOptions& options, const Solution& solution);

@@ -44,7 +44,7 @@ struct CornerSums {
 
 std::vector<CornerSums> corner_sums(const Observations& observations, const Solution& solution) {
   const Board& board = observations.board;
-  const BoardShape shape{board.width_m(), board.height_m()};
+  const BoardShape shape = board_shape(observations, solution);
   std::vector<CornerSums> sums(static_cast<size_t>(board.corner_count()));
   for (size_t i = 0; i < observations.corners.size(); ++i) {
     const CornerObservation& seen = observations.corners[i];
@@ -52,6 +52,7 @@ std::vector<CornerSums> corner_sums(const Observations& observations, const Solu
     const Vector2d& residual = solution.corner_residuals[i];
     if (!world_from_board || !residual.allFinite() || solution.corner_outlier[i]) continue;
     Vector3d p = board.p_corner(seen.corner);
+    p.head<2>() = printed_corner(board, solution.print, seen.corner);
     p.z() = shape.z(solution.bend_m, p.x(), p.y());
     const auto jacobian =
         by_point(solution.rig.cameras[static_cast<size_t>(seen.camera)], *world_from_board, p);
@@ -76,6 +77,28 @@ double common_stretch(const Rig& rig) {
   }
   if (low * high <= 0 || high - low > std::min(std::abs(low), std::abs(high))) return 0;
   return std::abs(low) < std::abs(high) ? low : high;
+}
+
+// The errors of an uneven print are unknowns of the solve. Where its size was measured, nothing is left of
+// them; else its scale is as uncertain as the print is uneven.
+void note_print(const Board& board, const Solution& solution, std::vector<Fault>* faults) {
+  constexpr double k_aspect = 4e-4, k_smooth_m = 0.05e-3;  // what prints on glass or aluminium keep
+  const Vector2d growth = print_growth(board, solution.print);
+  const double smooth = solution.print.tail(solution.print.size() - 3).norm() / std::sqrt(2.0);
+  if (std::abs(growth.x() - growth.y()) < k_aspect && smooth < k_smooth_m) return;
+  faults->push_back(
+      {FaultName::uneven_print,
+       fmt::format(
+           "the print's width and height differ from the board's text by {:+.2f} and {:+.2f} %, and its "
+           "corners from that by {:.2f} mm RMS{}",
+           100 * growth.x(), 100 * growth.y(), 1e3 * smooth,
+           solution.print_is_measured ? "" : "; how large it is follows from no observation"),
+       solution.print_is_measured
+           ? "this is part of the solve; a board made on glass or aluminium needs no correction"
+           : "measure from the first to the last inner corner, across and down, and give --board-measured; "
+             "or use a "
+             "board made on glass or aluminium",
+       solution.print_is_measured ? Severity::note : Severity::doubt});
 }
 
 }  // namespace
@@ -104,7 +127,7 @@ BoardOffsets board_offsets(const Observations& observations, const Solution& sol
 std::vector<Fault> board_faults(const Observations& observations, const Solution& solution) {
   std::vector<Fault> faults;
   const double width = observations.board.width_m();
-  const double bend = solution.bend_m.cwiseAbs().maxCoeff();
+  const double bend = std::max(solution.bend_m.cwiseAbs().maxCoeff(), std::abs(solution.twist_m));
   const BoardOffsets offsets = board_offsets(observations, solution);
   const double allowed = std::max(k_offset_m, k_offset_share * width);
   if (bend > std::max(k_bend_m, k_bend_share * width) || offsets.out_m > allowed)
@@ -112,9 +135,11 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
         {FaultName::bent_board,
          fmt::format(
              "the board differs from flat by {:.1f} mm over its width and height (bends of {:.1f} and {:.1f} "
-             "mm); its corners differ from that shape by {:.2f} mm RMS",
-             1e3 * bend, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(), 1e3 * offsets.out_m),
+             "mm, a twist of {:.1f} mm); its corners differ from that shape by {:.2f} mm RMS",
+             1e3 * bend, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(), 1e3 * solution.twist_m,
+             1e3 * offsets.out_m),
          "glue the board onto glass, aluminium or honeycomb and hold it without pressing it"});
+  if (solution.print.size() > 0) note_print(observations.board, solution, &faults);
   const double stretch = common_stretch(solution.rig);
   const bool is_stretched = std::abs(stretch) > 0.01;
   if (is_stretched || (faults.empty() && offsets.across_m > allowed))

@@ -39,10 +39,11 @@ enum class FaultName {
   saturated,
   repeated_pictures,
   scale_bar_not_seen,
-  wrong_scale
+  wrong_scale,
+  uneven_print
 };
 /// The names in reports, which programs read; they never change.
-inline constexpr EnumNames<FaultName, 25> k_fault_names{{"board_not_visible",
+inline constexpr EnumNames<FaultName, 26> k_fault_names{{"board_not_visible",
                                                          "board_not_placed",
                                                          "few_poses",
                                                          "little_tilt",
@@ -66,7 +67,8 @@ inline constexpr EnumNames<FaultName, 25> k_fault_names{{"board_not_visible",
                                                          "saturated",
                                                          "repeated_pictures",
                                                          "known_length_not_seen",
-                                                         "wrong_scale"}};
+                                                         "wrong_scale",
+                                                         "uneven_print"}};
 inline std::string to_text(FaultName name) { return k_fault_names.text(name); }
 
 /// Effect of a fault on the verdict.

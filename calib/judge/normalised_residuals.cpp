@@ -43,7 +43,7 @@ struct PoseByCorners {
 };
 
 PoseByCorners pose_by_corners(const Observations& observations, const Solution& solution, int pose) {
-  const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
+  const BoardShape shape = board_shape(observations, solution);
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   MatrixXd product = MatrixXd::Zero(6, solution.covariance.cols());
   const auto& board = solution.world_from_board[static_cast<size_t>(pose)];
@@ -54,7 +54,7 @@ PoseByCorners pose_by_corners(const Observations& observations, const Solution& 
     Vector2d px;
     Derivatives d;
     if (!predict_corner(view(camera), *board, shape, solution.bend_m,
-                        observations.board.p_corner(seen.corner).head<2>(), &px, &d))
+                        printed_corner(observations.board, solution.print, seen.corner), &px, &d))
       continue;
     const double weight = 1 / corner_variance(solution, seen);
     const int at = camera_at(solution, seen.camera), values = camera.lens.model.value_count();
@@ -83,9 +83,8 @@ Matrix2d predicted_covariance(const Observations& observations,
   const Imager& projector = solution.rig.projectors[static_cast<size_t>(match.projector)];
   Vector2d px;
   Derivatives d;
-  if (!predict_match(view(camera), view(projector), *board,
-                     {observations.board.width_m(), observations.board.height_m()}, solution.bend_m,
-                     match.px_camera, &px, &d))
+  if (!predict_match(view(camera), view(projector), *board, board_shape(observations, solution),
+                     solution.bend_m, match.px_camera, &px, &d))
     return none;
   const int camera_column = camera_at(solution, match.camera),
             camera_values = camera.lens.model.value_count();

@@ -30,7 +30,7 @@ constexpr double k_least_measured_px =
     0.02;  // noise of markers' corners: 0.01 to 0.03 px (limn bench tracker)
 // 70 degrees: nobody looks for a part on surfaces lit at a more grazing angle.
 constexpr double k_least_cosine = 0.34;
-constexpr double k_share = 0.95;
+constexpr double k_stated_share = 0.95;
 
 Matrix3d cross(const Vector3d& v) {
   Matrix3d m;
@@ -283,7 +283,7 @@ double p95_of(std::span<const std::vector<Eigen::Matrix2d>> groups) {
     double share = 0;
     for (const auto& [variance, weight] : rays)
       share += weight * (variance > 0 ? -std::expm1(-middle * middle / (2 * variance)) : 1.0);
-    (share < k_share * total ? low : high) = middle;
+    (share < k_stated_share * total ? low : high) = middle;
   }
   return high;
 }

@@ -27,6 +27,8 @@ struct Report {
   std::string made_at = {};                             ///< as PastCalibration::made_at
   History history = {};                                 ///< history of the folder that the report is for
   std::vector<ScaleBarCheck> scale_bar_lengths = {};
+  /// What the scale rests on: board, board_measured or known_length.
+  std::string scale_rests_on = "board";
 };
 
 /// report.json, as docs/formats.md describes it.

@@ -172,6 +172,7 @@ std::string report_json(const Report& report) {
                        {"outliers", a.decode_outliers}}},
                      {"epipolar", epipolar_json(report)},
                      {"pulls", normalised_residuals_json(a.normalised_residuals)},
+                     {"scale_rests_on", report.scale_rests_on},
                      {"known_lengths", lengths_json(report)},
                      {"faults", faults},
                      {"moved", moved_json(since_last)},

@@ -410,12 +410,12 @@ Vector3d middle_seen(const std::vector<Patch>& patches, const Vector3d& d) {
   return weights > 0 ? Vector3d(sum / weights) : Vector3d::Zero();
 }
 
-struct Candidate {
+struct PlacedCandidate {
   Pose pose;
   double cost = 0;  // mean of the squared truncated distances as a share of the limit
 };
 
-void keep_best(std::size_t count, std::vector<Candidate>* candidates) {
+void keep_best(std::size_t count, std::vector<PlacedCandidate>* candidates) {
   std::stable_sort(candidates->begin(), candidates->end(),
                    [](const auto& a, const auto& b) { return a.cost < b.cost; });
   if (candidates->size() > count) candidates->resize(count);
@@ -439,10 +439,10 @@ std::vector<ScanPoint> every(const std::vector<ScanPoint>& points, std::size_t a
   return out;
 }
 
-std::vector<Candidate> coarse_poses(const std::vector<Patch>& patches,
-                                    const DistanceField& field,
-                                    const std::vector<ScanPoint>& points,
-                                    double mesh_diagonal) {
+std::vector<PlacedCandidate> coarse_poses(const std::vector<Patch>& patches,
+                                          const DistanceField& field,
+                                          const std::vector<ScanPoint>& points,
+                                          double mesh_diagonal) {
   constexpr int k_turns = 1200;  // about 20 degrees apart
   constexpr std::size_t k_quick_points = 250, k_kept = 30;
   const std::vector<ScanPoint> few = every(points, k_quick_points);
@@ -457,11 +457,11 @@ std::vector<Candidate> coarse_poses(const std::vector<Patch>& patches,
   }
   middle /= weights;
   const Vector3d u = d_scanner.unitOrthogonal(), v = d_scanner.cross(u);
-  std::vector<Candidate> best;
+  std::vector<PlacedCandidate> best;
   for (int i = 0; i < k_turns; ++i) {
     const Eigen::Quaterniond rotation = spread_rotation(i, k_turns);
     const Vector3d p_mesh = middle_seen(patches, rotation.conjugate() * d_scanner);
-    Candidate here{Pose(), std::numeric_limits<double>::infinity()};
+    PlacedCandidate here{Pose(), std::numeric_limits<double>::infinity()};
     for (int a = -2; a <= 2; ++a)
       for (int b = -2; b <= 2; ++b) {
         const Vector3d beside = 0.09 * mesh_diagonal * (a * u + b * v);
@@ -597,8 +597,8 @@ Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
     const auto points = every(thinned(part, options.cell * size), k_long_points);
     if (static_cast<int>(points.size()) < 4 * k_least_points) continue;
     const auto some = every(points, k_short_points);
-    std::vector<Candidate> shorts;
-    for (const Candidate& candidate : coarse_poses(patches, field, points, size)) {
+    std::vector<PlacedCandidate> shorts;
+    for (const PlacedCandidate& candidate : coarse_poses(patches, field, points, size)) {
       const auto fit = fitted(index, some, candidate.pose, 0.15 * size, k_short_steps);
       if (fit)
         shorts.push_back(
@@ -606,7 +606,7 @@ Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
     }
     keep_best(shorts.size(), &shorts);
     std::vector<Pose> tried;
-    for (const Candidate& candidate : shorts) {
+    for (const PlacedCandidate& candidate : shorts) {
       const bool again = std::any_of(tried.begin(), tried.end(), [&](const Pose& pose) {
         return same_pose(pose, candidate.pose, patches[0].p, size);
       });

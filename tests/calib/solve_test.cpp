@@ -25,7 +25,7 @@ constexpr double k_infinite = std::numeric_limits<double>::infinity();
 SolveOptions without_priors() {
   SolveOptions options;
   options.camera_centre = options.projector_centre = options.aspect = options.radial = options.tangential =
-      options.bend_share = k_infinite;
+      options.projector_radial = options.projector_tangential = options.bend_share = k_infinite;
   return options;
 }
 

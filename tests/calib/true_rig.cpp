@@ -263,7 +263,7 @@ TrueRig make_true_rig(const RigOptions& options) {
 
 calib::Observations observed_perfectly(const TrueRig& truth, int each) {
   const calib::Board& board = truth.board;
-  const calib::BoardShape shape{board.width_m(), board.height_m()};
+  const calib::BoardShape shape{board.width_m(), board.height_m(), truth.twist_m};
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
   calib::Observations observations;
   observations.board = board;

@@ -19,7 +19,8 @@ struct TrueRig {
   calib::Board board;
   std::vector<Pose> world_from_board;
   Eigen::Vector2d bow_m = Eigen::Vector2d::Zero();  ///< bend of the board, as in calib::BoardShape
-  Pose world_from_prototype;                        ///< centre of the space, facing camera and projector
+  double twist_m = 0;
+  Pose world_from_prototype;  ///< centre of the space, facing camera and projector
 };
 
 struct RigOptions {

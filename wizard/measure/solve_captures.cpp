@@ -54,6 +54,33 @@ Status check_models(const SolveCommandOptions& options) {
   return {};
 }
 
+// The print's measured size; none where nobody measured it.
+Result<std::optional<calib::BoardMeasured>> measured_board(const calib::CaptureSet& captures,
+                                                           const std::string& text) {
+  std::optional<calib::BoardMeasured> measured = captures.board_measured;
+  if (!text.empty()) {
+    const auto parsed = calib::parse_board_measured(text);
+    if (!parsed) return usage_error("{}", parsed.message());
+    measured = *parsed;
+  }
+  if (measured) LIMN_TRY_STATUS(calib::check_measured(captures.board, *measured));
+  return measured;
+}
+
+// Solves again with the print's errors as unknowns where the observations show that it is uneven.
+Status solve_uneven_print(const calib::Observations& observations,
+                          const SolveCommandOptions& options,
+                          calib::SolveOptions* solving,
+                          calib::ModelSelection* choice) {
+  if (options.pixels_not_square) return {};
+  solving->print_size = calib::uneven_print(observations, *solving, choice->solution);
+  if (solving->print_size == 0) return {};
+  solving->square_pixels = true;
+  LIMN_TRY(choice->solution, calib::solve_from(observations, *solving, choice->solution));
+  LIMN_TRY(choice->held_out, calib::cross_validate(observations, *solving, choice->solution));
+  return {};
+}
+
 // Measures the scale bars. A wrong length is a fault, and a rig with a fault of scale is never "good".
 Status check_lengths(const calib::CaptureSet& captures,
                      const std::vector<calib::ScaleBar>& lengths,
@@ -109,6 +136,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   LIMN_TRY(const calib::CaptureSet captures,
            captures_of(options.captures, options.skip_poses, options.foreign));
   LIMN_TRY_STATUS(check_axes(captures));
+  LIMN_TRY(const auto measured, measured_board(captures, options.board_measured));
   LIMN_TRY(const auto lengths, scale_bar_lengths(captures, options.scale_bar_lengths));
   LIMN_TRY_STATUS(calib::check_images(captures));
   LIMN_TRY(calib::MeasuredResponse response, calib::measure_response(captures));
@@ -120,15 +148,18 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   calib::SolveOptions solving;
   solving.camera_model = options.camera_model;
   solving.projector_model = options.projector_model;
+  solving.board_measured = measured;
+  solving.square_pixels = solving.board_measured && !options.pixels_not_square;
   const auto solving_begun = Clock::now();
   auto choice = calib::solve_selecting_models(observed.observations, solving);
   if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
   solving = choice->options;
+  LIMN_TRY_STATUS(solve_uneven_print(observed.observations, options, &solving, &*choice));
   calib::Solution* const solution = &choice->solution;
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} iterations; measuring the held-out error", solution->iterations);
   const auto judging_begun = Clock::now();
-  calib::Assessment assessment = calib::assess(observed, *solution, std::move(choice->held_out));
+  calib::Assessment assessment = calib::assess(observed, *solution, std::move(choice->held_out), solving);
   compare_with_earlier(options, *solution, &assessment);
   calib::Report report{std::move(observed),
                        std::move(*solution),
@@ -143,6 +174,8 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
   LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
   report.explanation = calib::explain(report.observed, report.solution, report.assessment);
+  if (!lengths.empty()) report.scale_rests_on = "known_length";
+  if (measured) report.scale_rests_on = "board_measured";
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(write_together(options.out, [&](const std::filesystem::path& into) -> Status {

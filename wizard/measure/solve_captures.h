@@ -23,6 +23,10 @@ struct SolveCommandOptions {
   /// Scale bars that the cameras see, each as "apriltag_36h11:3 apriltag_36h11:7 250mm", in addition to those
   /// of capture.json.
   std::vector<std::string> scale_bar_lengths = {};
+  /// The print's measured size, as calib/board_print.h reads it; empty: that of capture.json, if any.
+  std::string board_measured = {};
+  /// Cameras' pixels may be not square (images that were stretched), so that no print is found to be uneven.
+  bool pixels_not_square = false;
 };
 
 /// Solves captures and writes the rig folder (rig.json, .cameramodel files, report.json, report.html,

@@ -1,0 +1,194 @@
+#include "calib/board_print.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "calib/judge/assess.h"
+#include "calib/measurement_model.h"
+#include "calib/solve.h"
+#include "tests/calib/true_rig.h"
+#include "tests/support/matchers.h"
+
+namespace limn::test {
+namespace {
+
+using calib::BoardMeasured;
+using Eigen::Vector2d;
+
+constexpr double k_pnp_px = 0.02;
+constexpr double k_bend_m = 0.4e-3;
+
+// A print that is 0.15 % wider than it is high, with smooth errors of 0.1 mm (waves, which no polynomial of
+// the solve is), on a board that is bowed and twisted.
+struct Print {
+  double aspect = 0.0015, smooth_m = 0.1e-3;
+  double phase = 0.7;
+
+  Vector2d at(const calib::Board& board, const Vector2d& p) const {
+    const double x = p.x() / board.width_m(), y = p.y() / board.height_m(), tau = 2 * std::numbers::pi;
+    return {p.x() * (1 + aspect) + smooth_m * std::sin(tau * (0.7 * x + 0.5 * y) + phase),
+            p.y() + smooth_m * std::cos(tau * (0.4 * x - 0.7 * y) + 2 * phase)};
+  }
+  // From the first to the last inner corner, as means over rows and columns.
+  Vector2d lengths(const calib::Board& board) const {
+    Vector2d sum = Vector2d::Zero();
+    const int columns = board.columns - 1, rows = board.rows - 1;
+    const auto corner = [&](int column, int row) {
+      return at(board, board.p_corner(row * columns + column).head<2>());
+    };
+    for (int row = 0; row < rows; ++row) sum.x() += (corner(columns - 1, row) - corner(0, row)).x() / rows;
+    for (int column = 0; column < columns; ++column)
+      sum.y() += (corner(column, rows - 1) - corner(column, 0)).y() / columns;
+    return sum;
+  }
+};
+
+struct Printed {
+  TrueRig truth;
+  calib::Observations observations;
+};
+
+Printed printed(const Print& print, unsigned seed, std::mt19937_64* rng) {
+  Printed made;
+  made.truth = make_true_rig({.k1 = -0.05, .shift = 0.5, .poses = 12, .seed = seed});
+  Imager& camera = made.truth.rig.cameras[0];
+  camera.lens.values[1] = camera.lens.values[0];  // square pixels
+  made.truth.bow_m = {k_bend_m, 0};
+  made.truth.twist_m = k_bend_m;
+  made.observations = observed_perfectly(made.truth, 4);
+  const calib::Board& board = made.truth.board;
+  for (calib::CornerObservation& corner : made.observations.corners) {
+    EXPECT_TRUE(calib::predict_corner({camera.lens.model, camera.lens.values, camera.imager_from_world},
+                                      made.truth.world_from_board[static_cast<size_t>(corner.pose)],
+                                      {board.width_m(), board.height_m(), made.truth.twist_m},
+                                      made.truth.bow_m,
+                                      print.at(board, board.p_corner(corner.corner).head<2>()), &corner.px));
+  }
+  add_noise(0.015, 0.03, rng, &made.observations);
+  for (calib::Match& match : made.observations.matches) match.stddev_px = 0.03;
+  return made;
+}
+
+struct Judged {
+  Landed landed;
+  double stated_mm = 0;
+  calib::Assessment assessment;
+};
+
+Judged judged(const Printed& made, const calib::SolveOptions& options, std::mt19937_64* rng) {
+  const auto solution = calib::solve(made.observations, options);
+  EXPECT_TRUE(solution.ok()) << solution.message();
+  Judged result;
+  result.assessment = calib::assess({made.observations, {}, {}, 0, 0}, options, *solution).value();
+  result.stated_mm = result.assessment.predicted_error_mm[0];
+  result.landed = landed(made.truth, solution->rig, prototype_mesh(Prototype::panel), k_pnp_px, 400, rng);
+  return result;
+}
+
+TEST(BoardPrint, SmoothModesHaveUnitRmsAndLengthsFollowTheSizes) {
+  const calib::Board board = calib::Board::parse("charuco:10x7:25mm").value();
+  Eigen::Matrix<double, calib::k_print_modes, 1> squares;
+  squares.setZero();
+  constexpr int k_side = 200;
+  for (int i = 0; i < k_side * k_side; ++i) {
+    const Vector2d p((i % k_side + 0.5) / k_side * board.width_m(),
+                     (i / k_side + 0.5) / k_side * board.height_m());
+    squares += calib::print_modes(board, p).cwiseAbs2().colwise().sum().transpose() / (k_side * k_side);
+  }
+  for (int i = 3; i < calib::k_print_modes; ++i) EXPECT_NEAR(squares[i], 1, 1e-3) << i;
+  EXPECT_TRUE(near(calib::nominal_lengths(board), Vector2d(0.2, 0.125), 1e-12));
+  Eigen::VectorXd print = Eigen::VectorXd::Zero(calib::k_print_modes);
+  print[0] = 0.001 * board.width_m() / 2;  // 0.1 % wider
+  EXPECT_TRUE(near(Vector2d(calib::by_print(board) * print), Vector2d(0.0002, 0), 1e-9));
+}
+
+TEST(BoardPrint, MeasuredSizesAreReadAndChecked) {
+  const auto read = calib::parse_board_measured("225.2x149.9mm:0.05");
+  ASSERT_TRUE(read.ok()) << read.message();
+  EXPECT_NEAR(read->width_m, 0.2252, 1e-12);
+  EXPECT_NEAR(read->height_m, 0.1499, 1e-12);
+  EXPECT_NEAR(read->stddev_m, 5e-5, 1e-12);
+  EXPECT_NEAR(calib::parse_board_measured("225x150mm")->stddev_m, 1e-4, 1e-12);
+  for (const char* text : {"", "225.2", "225.2x149.9", "225.2x149.9cm", "-1x3mm", "225x150mm:0",
+                           "225x150mm:x", "0x150mm", "225x150mm:50"})
+    EXPECT_FALSE(calib::parse_board_measured(text).ok()) << text;
+  const calib::Board board = calib::Board::parse("charuco:10x7:25mm").value();
+  EXPECT_TRUE(calib::check_measured(board, {0.2003, 0.1249}).ok());
+  const auto message = [&](double width, double height) {
+    return calib::check_measured(board, {width, height}).message();
+  };
+  EXPECT_NE(message(0.125, 0.2).find("swapped"), std::string::npos);
+  EXPECT_NE(message(0.02, 0.0125).find("in cm"), std::string::npos);
+  EXPECT_NE(message(0.25, 0.175).find("200.00 x 125.00 mm"), std::string::npos);
+}
+
+TEST(BoardPrint, LengthsMakeUpForABadPrint) {
+  std::mt19937_64 rng = test_rng();
+  for (const double stddev_m : {0.03e-3, 0.1e-3}) {
+    std::vector<double> place, moved, turned, ratios, without;
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      const Print print{.phase = 0.9 * seed};
+      const Printed made = printed(print, seed, &rng);
+      std::normal_distribution<double> error(0, stddev_m);
+      const Vector2d lengths = print.lengths(made.truth.board) + Vector2d(error(rng), error(rng));
+      const Judged with = judged(
+          made, {.board_measured = BoardMeasured{lengths.x(), lengths.y(), stddev_m}, .square_pixels = true},
+          &rng);
+      for (const double e : with.landed.in_place_mm) place.push_back(e);
+      for (const double e : with.landed.moved_mm) moved.push_back(e);
+      for (const double e : with.landed.turned_mm) turned.push_back(e);
+      for (const double e : with.landed.pooled_mm()) ratios.push_back(e / with.stated_mm);
+      for (const double e : judged(made, {}, &rng).landed.pooled_mm()) without.push_back(e);
+    }
+    printf(
+        "[ print    ] lengths to %.2f mm: %.3f/%.3f/%.3f mm RMS, holds for %.1f %%; without lengths %.3f "
+        "mm\n",
+        1e3 * stddev_m, rms(place), rms(moved), rms(turned), 100 * share_within(ratios, 1), rms(without));
+    const double limit = stddev_m < 0.05e-3 ? 0.08 : 0.15;
+    EXPECT_LT(rms(place), limit);
+    EXPECT_LT(rms(moved), std::max(limit, 0.10));
+    EXPECT_LT(rms(turned), limit);
+    EXPECT_GT(share_within(ratios, 1), 0.85);  // four rigs
+    EXPECT_GT(rms(without), 1.5 * rms(moved));
+  }
+}
+
+TEST(BoardPrint, AnUnevenPrintShowsWithoutLengthsAndUnevenPixelsAreNotTakenForOne) {
+  std::mt19937_64 rng = test_rng();
+  std::vector<double> ratios, solved, exact;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const Printed made = printed({.phase = 0.9 * seed}, seed, &rng);
+    const calib::Solution plain = calib::solve(made.observations).value();
+    const double uneven = calib::uneven_print(made.observations, {}, plain);
+    EXPECT_GT(uneven, 0.0006);  // 0.0015 by its size alone; the smooth errors grow it or shrink it
+    EXPECT_LT(uneven, 0.004);
+    const Judged with = judged(made, {.print_size = uneven, .square_pixels = true}, &rng);
+    for (const double e : with.landed.pooled_mm()) {
+      ratios.push_back(e / with.stated_mm);
+      solved.push_back(e);
+    }
+    for (const double e : judged(made, {}, &rng).landed.pooled_mm()) exact.push_back(e);
+    EXPECT_TRUE(std::any_of(with.assessment.faults.begin(), with.assessment.faults.end(),
+                            [](const calib::Fault& f) {
+                              return f.name == calib::FaultName::uneven_print &&
+                                     f.severity == calib::Severity::doubt;
+                            }))
+        << calib::to_text(with.assessment.faults);
+  }
+  printf("[ print    ] without lengths: %.3f mm RMS, as an exact board %.3f mm; stated holds for %.1f %%\n",
+         rms(solved), rms(exact), 100 * share_within(ratios, 1));
+  EXPECT_GT(share_within(ratios, 1), 0.9);
+  EXPECT_LT(rms(solved), rms(exact));
+
+  const TrueRig truth =
+      make_true_rig({.k1 = -0.05, .shift = 0.5, .seed = 5});  // its pixels are 0.13 % uneven
+  calib::Observations observations = observed_perfectly(truth, 4);
+  add_noise(0.015, 0.03, &rng, &observations);
+  EXPECT_EQ(calib::uneven_print(observations, {}, calib::solve(observations).value()), 0);
+}
+
+}  // namespace
+}  // namespace limn::test
