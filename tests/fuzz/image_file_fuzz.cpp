@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/image_io.h"
+#include "core/log.h"
 #include "tests/fuzz/fuzz_file.h"
 
 namespace {
@@ -25,6 +26,7 @@ void check(std::string_view bytes, const ImageOptions& options) {
 }  // namespace
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
+  set_log_level(LogLevel::quiet);
   const std::string_view file(reinterpret_cast<const char*>(bytes), size);
   check(file, {.alpha = Alpha::kept});
   check(file, {.grey = true, .used_bits = k_found_in_image});

@@ -1,8 +1,9 @@
 // Meshes with their textures. The first line is the ending of the mesh's name, such as .obj. Lines of %%
 // divide the rest into the mesh and the files beside it: mesh.mtl, texture.png, mesh.bin. A .3mf may be given
 // as its XML only, because an archive's checksums would reject every mutation inside it. What assimp and
-// Draco read is left out, because they crash on damaged files; the program runs them in a child process
-// first.
+// Draco read is left out, because assimp crashes on damaged files; the program tries every mesh in a child
+// process first.
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
 #include "core/log.h"
@@ -34,10 +35,13 @@ fs::path written_mesh(std::string_view bytes, const std::string& ending) {
   return written(packed.value(), "mesh.3mf");
 }
 
-bool is_for_library(const fs::path& path, std::string_view bytes) {
+// Whether assimp (glTF 1.0) or Draco reads the file.
+bool is_for_library(const fs::path& path, std::string_view bytes) try {
   if (bytes.find("draco") != std::string_view::npos) return true;
   const auto gltf = scene::GltfFile::open(path);
   return gltf && gltf->version() == 1;
+} catch (const nlohmann::json::exception&) {
+  return false;
 }
 
 void check_image(const cv::Mat& image) {
