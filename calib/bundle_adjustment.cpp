@@ -23,6 +23,9 @@ using Eigen::VectorXd;
 constexpr double k_unseen = 1e4;
 constexpr int k_most_steps = 200;
 constexpr double k_settled = 1e-10;  // share of the cost: a step that promises less is the last
+// The board's twist as a share of its width where the print is not solved: none. As an unknown, it led solves
+// of damaged captures to wrong minima.
+constexpr double k_no_twist_share = 1e-7;
 constexpr double k_first_damping = 1e-6, k_least_damping = 1e-12, k_most_damping = 1e10;
 
 ImagerView view(const Imager& imager) {
@@ -287,11 +290,14 @@ void BundleAdjuster::add_priors(const Parameters& at, NormalEquations* normal) c
   for (size_t i = 0; i < at.cameras.size(); ++i) add_lens_prior(at.cameras[i], false, camera_at_[i], normal);
   for (size_t i = 0; i < at.projectors.size(); ++i)
     add_lens_prior(at.projectors[i], true, projector_at_[i], normal);
-  const double weight = 1 / (options_.bend_share * observations_.board.width_m());
   const Vector3d bends(at.bend_m.x(), at.bend_m.y(), at.twist_m);
-  normal->cost += bends.squaredNorm() * weight * weight / 2;
-  normal->devices.block<3, 3>(board_at_, board_at_).diagonal().array() += weight * weight;
-  normal->gradient.segment<3>(board_at_) += weight * weight * bends;
+  const double twist_share = at.print.size() > 0 ? options_.bend_share : k_no_twist_share;
+  const Vector3d weights = 1 / (Eigen::Array3d(options_.bend_share, options_.bend_share, twist_share) *
+                                observations_.board.width_m());
+  const Vector3d squares = weights.cwiseAbs2();
+  normal->cost += bends.cwiseAbs2().dot(squares) / 2;
+  normal->devices.block<3, 3>(board_at_, board_at_).diagonal() += squares;
+  normal->gradient.segment<3>(board_at_) += squares.cwiseProduct(bends);
   if (at.print.size() > 0) add_print_priors(at, normal);
 }
 

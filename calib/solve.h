@@ -46,7 +46,7 @@ struct SolveOptions {
   double tangential = 0.02;
   double projector_radial = 0.5;
   double projector_tangential = 0.02;
-  /// The board's bend from 0, as a share of its width.
+  /// The board's bend from 0, as a share of its width; also its twist, where the print's errors are unknowns.
   double bend_share = 0.01;
 };
 
