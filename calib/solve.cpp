@@ -17,7 +17,7 @@ using Eigen::Vector2d;
 constexpr double k_outlier_at = 4;  // standard deviations: one in 3000 of correct observations
 // Lower limits of the estimated noise: perfect observations would have infinite weights.
 constexpr double k_least_noise_px = 0.005, k_least_scale = 0.25;
-constexpr double k_rayleigh_median = 1.1774;  // of the length of a residual, standard deviations
+constexpr double k_rayleigh_median = 1.1774;  // median length of a residual, standard deviations
 // Distortion that projectors' lenses may have although none was found.
 constexpr double k_pinhole_radial = 0.1, k_pinhole_tangential = 0.002;
 constexpr int k_rounds = 3;  // the noise is known only after a fit; it sets the next fit's weights
@@ -47,7 +47,7 @@ NoiseLevel level_of(const std::vector<Deviation>& deviations, const NoiseLevel& 
   }
   double high = 1e3;
   constexpr int k_halvings = 50;
-  for (int i = 0; i < k_halvings; ++i) {  // of the logarithm
+  for (int i = 0; i < k_halvings; ++i) {  // halves the logarithm's interval
     const double middle = std::sqrt(level.common_px * high);
     (median_at({middle, 1}) > 1 ? level.common_px : high) = middle;
   }

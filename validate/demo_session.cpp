@@ -189,6 +189,11 @@ double composite_error_px(DemoSession* session,
   return outline_distance_px(coverage.at(0).mask, true_mask) / 2;
 }
 
+struct JudgedDots {
+  TargetDots dots;
+  Registration registration;
+};
+
 // The door with every dot in the colour of its error, over a photograph.
 cv::Mat error_map(const cv::Mat& photograph, const sim::World& world, const JudgedDots& judged) {
   const auto& [dots, found] = judged;
@@ -220,13 +225,14 @@ Result<Place> judge_place(const std::string& name,
   room->move("prototype", world_from_prototype);
   LIMN_TRY(Moment moment, phases->time("track", [&] { return track_moment(session, room, {}); }));
   const sim::World& world = room->world();
-  LIMN_TRY(JudgedDots judged, phases->time("judge", [&] {
-    return judge_light(session->scene, session->rig, world, *moment.posed.world_from_prototype);
+  TargetDots dots = phases->time("judge", [&] { return dots_on_prototype(world); });
+  LIMN_TRY(Registration registration, phases->time("judge", [&] {
+    return judge_light(session->scene, session->rig, world, dots, *moment.posed.world_from_prototype);
   }));
   LIMN_TRY(const LightChain chain, phases->time("judge", [&] {
-    return light_chain(session->scene, session->rig, world, session->bodies, moment.detections);
+    return light_chain(session->scene, session->rig, world, dots, session->bodies, moment.detections);
   }));
-  return Place{name, std::move(moment), std::move(judged), chain};
+  return Place{name, std::move(moment), {std::move(dots), std::move(registration)}, chain};
 }
 
 // The door in place, moved by 150 mm, and turned by 40°.

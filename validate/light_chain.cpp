@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "projector/renderer.h"
 #include "tracker/body_estimate.h"
@@ -67,27 +68,32 @@ Result<Pose> place_of_prototype(const Rig& rig,
 
 }  // namespace
 
-Result<JudgedDots> judge_light(const scene::Scene& scene,
-                               const Rig& rig,
-                               const sim::World& world,
-                               const Pose& world_from_prototype) {
-  const TargetDots dots = target_dots(world, k_judged_points, k_judged_seed);
+TargetDots dots_on_prototype(const sim::World& world) {
+  return target_dots(world, k_judged_points, k_judged_seed);
+}
+
+Result<Registration> judge_light(const scene::Scene& scene,
+                                 const Rig& rig,
+                                 const sim::World& world,
+                                 const TargetDots& dots,
+                                 const Pose& world_from_prototype) {
   LIMN_TRY(projector::Renderer renderer, dots_renderer(scene, rig, dots));
   const scene::PosedScene posed{world_from_prototype, {{"dots", "dots", world_from_prototype}}};
   std::vector<cv::Mat> images;
   for (std::size_t i = 0; i < rig.projectors.size(); ++i)
     images.push_back(renderer.projector_image(i, posed, rig.cameras.at(0)));
-  return JudgedDots{dots, judged_registration(world, dots, images)};
+  return judged_registration(world, dots, images);
 }
 
 Result<LightChain> light_chain(const scene::Scene& scene,
                                const Rig& calibrated,
                                const sim::World& world,
+                               const TargetDots& dots,
                                std::span<const Body> bodies,
                                std::span<const tracker::Detection> detections) {
   const auto error_mm = [&](const Rig& rig, const Pose& world_from_prototype) -> Result<double> {
-    LIMN_TRY(const JudgedDots judged, judge_light(scene, rig, world, world_from_prototype));
-    return judged.registration.rms_mm;
+    LIMN_TRY(const Registration judged, judge_light(scene, rig, world, dots, world_from_prototype));
+    return judged.rms_mm;
   };
   const auto exact = with_true_corners(detections, bodies, world);
   LIMN_TRY(const Pose by_exact, place_of_prototype(world.rig, scene, bodies, exact));

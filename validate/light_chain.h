@@ -1,7 +1,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "core/marker.h"
 #include "core/result.h"
@@ -13,18 +12,17 @@
 
 namespace limn::validate {
 
-struct JudgedDots {
-  TargetDots dots;
-  Registration registration;
-};
+/// Dots all over the true world's prototype.
+TargetDots dots_on_prototype(const sim::World& world);
 
-/// Draws dots all over the prototype with a renderer that knows `rig` and the prototype's place in that rig's
-/// world, and compares their light with the true world's points. `scene` gives the prototype. Error: no GPU
-/// or software OpenGL.
-Result<JudgedDots> judge_light(const scene::Scene& scene,
-                               const Rig& rig,
-                               const sim::World& world,
-                               const Pose& world_from_prototype);
+/// Draws the dots with a renderer that knows `rig` and the prototype's place in that rig's world, and
+/// compares their light with the true world's points. `scene` gives the prototype. Error: no GPU or software
+/// OpenGL.
+Result<Registration> judge_light(const scene::Scene& scene,
+                                 const Rig& rig,
+                                 const sim::World& world,
+                                 const TargetDots& dots,
+                                 const Pose& world_from_prototype);
 
 /// RMS distance of the light from where it is aimed, mm, when one stage is the session's and the others are
 /// true: what each stage adds to the error of the whole chain. The stages' errors are nearly independent, so
@@ -41,6 +39,7 @@ struct LightChain {
 Result<LightChain> light_chain(const scene::Scene& scene,
                                const Rig& calibrated,
                                const sim::World& world,
+                               const TargetDots& dots,
                                std::span<const Body> bodies,
                                std::span<const tracker::Detection> detections);
 
