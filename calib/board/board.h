@@ -50,7 +50,8 @@ struct Board {
   /// i - 1 and i.
   double p_line(int line) const {
     if (kind != BoardKind::aprilgrid) return line * square_m;
-    return (line / 2 * (1 + gap_share) + line % 2 * gap_share) * square_m;
+    const int pairs = line / 2;
+    return (pairs * (1 + gap_share) + line % 2 * gap_share) * square_m;
   }
   double width_m() const { return p_line(is_shifted() ? 2 * columns - 1 : columns); }
   double height_m() const { return p_line(rows); }

@@ -25,8 +25,8 @@ inline cv::Mat photographed_board(const calib::Board& board,
     for (int x = 0; x < camera.width; ++x) {
       double sum = 0;
       for (int i = 0; i < samples * samples; ++i) {
-        const Eigen::Vector2d px(x + (i % samples + 0.5) / samples - 0.5,
-                                 y + (i / samples + 0.5) / samples - 0.5);
+        const int column = i % samples, row = i / samples;
+        const Eigen::Vector2d px(x + (column + 0.5) / samples - 0.5, y + (row + 0.5) / samples - 0.5);
         const auto ray = camera.lens.unproject(px);
         if (!ray) continue;
         const Eigen::Vector3d d = board_from_camera.rotation * *ray;
