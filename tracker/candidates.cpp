@@ -17,8 +17,7 @@ constexpr double k_min_box_share = 0.04;
 // Distance at which a boundary point becomes a corner: larger than the staircase, noise and the bow that a
 // lens gives a side.
 constexpr double k_corner_px = 1.4;
-constexpr double k_corner_share = 0.012;       // share of the boundary's length
-constexpr double k_corner_height_share = 0.3;  // and at most this share of the height, for steep markers
+constexpr double k_corner_share = 0.012;  // share of the boundary's length
 // Largest RMS distance of a side's cracks from its line: 0.3 px for a perfect staircase, plus noise and the
 // lens's bow.
 constexpr double k_max_side_rms_px = 0.75;

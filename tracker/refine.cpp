@@ -626,8 +626,8 @@ bool EdgeRefiner::fit_curve(double* variance, EdgeLine* line) {
   scales << 1, 1 / line->half, 0, 0, 0;
   for (int i = 2; i < 5; ++i) scales[i] = scales[i - 1] * scales[1];
   Terms terms = line->terms().cwiseQuotient(scales);
-  const double bow_share = std::abs(line->curvature) * line->half;
-  const double expected_px = k_curve_share * line->bow_px() * std::min(1.0, bow_share / k_curved_bow_share);
+  const double expected_px =
+      k_curve_share * line->bow_px() * std::min(1.0, line->bow_share() / k_curved_bow_share);
   Matrix covariance;
   for (int round = 0; round < k_rounds; ++round) {
     deviations_.resize(count);
