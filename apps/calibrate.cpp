@@ -19,6 +19,7 @@
 #include "wizard/capture/virtual_backend.h"
 #include "wizard/capture/virtual_capture.h"
 #include "wizard/guided_poses.h"
+#include "wizard/measure/solve_captures.h"
 #include "wizard/pose_instructions.h"
 #include "wizard/sequence.h"
 #include "wizard/window/wizard_window.h"
@@ -73,8 +74,7 @@ std::string to_json(const wizard::Calibrated& done) {
 }
 
 void say_end(const CalibrateOptions& options, const wizard::Calibrated& done, const Say& say) {
-  for (const calib::Fault& fault : done.report.assessment.faults)
-    say("fault " + calib::to_text(fault));
+  for (const calib::Fault& fault : done.report.assessment.faults) say("fault " + calib::to_text(fault));
   for (const std::string& sentence : done.report.explanation.advice) say("advice: " + sentence);
   std::vector<std::string> times;
   for (const auto& [projector, seconds] : done.capture_s)
@@ -113,7 +113,7 @@ std::optional<gui::GuiWindow> window_for(const CalibrateOptions& options,
 // Runs the wizard in a window or in the terminal, and prints the result.
 Status play(const CalibrateOptions& options,
             const std::string& plan_json,
-            const wizard::WizardPlan& plan,
+            wizard::WizardPlan plan,
             const wizard::WizardBackend& backend,
             std::optional<gui::GuiWindow> window,
             std::atomic<wizard::WizardWish>* wish,
@@ -123,6 +123,7 @@ Status play(const CalibrateOptions& options,
     print_out("{}\n", line);
     std::fflush(stdout);
   };
+  LIMN_TRY(plan.captures.board_measured, wizard::measured_board(plan.captures, options.board_measured));
   const wizard::WizardWork work = [&](const wizard::WizardBackend& where,
                                       const wizard::WizardListener& listener) {
     return wizard::calibrate_rig({options.out, options.scene, options.scan, options.all}, plan_json,

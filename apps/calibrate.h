@@ -15,6 +15,7 @@ struct CalibrateOptions {
   std::filesystem::path devices = {};                  ///< limn.devices/1, instead of a plan.
   std::string board = {};                              ///< With devices: `charuco:11x8:25mm`.
   calib::PatternCode code = calib::PatternCode::gray;  ///< With devices.
+  std::string board_measured = {};                     ///< The print's measured size, as for limn solve.
   std::filesystem::path out;                           ///< Rig folder; its captures/ keeps every image.
   std::filesystem::path scene =
       {};             ///< Scene with the prototype's CAD mesh; with a plan the default is its world's scene.

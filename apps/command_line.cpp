@@ -344,6 +344,14 @@ void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
                     "With --import phase: the steps run the other way, + step / steps");
 }
 
+void add_board_measured(CLI::App* command, std::string* text) {
+  command->add_option(
+      "--board-measured", *text,
+      "Measured size of the printed board, from its first to its last inner corner, across and down, with "
+      "the "
+      "uncertainty in mm: 225.2x149.9mm:0.05 (0.1 when absent). The print's errors are then solved, too");
+}
+
 void add_solve(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand(
       "solve", "Calibrate a rig from captures, with a report that says how accurate it is");
@@ -375,13 +383,10 @@ void add_solve(CLI::App& app, Run& run) {
   command
       ->add_option("--known-length", options->scale_bar_lengths,
                    "Scale bar: two markers and their measured distance, such as 'apriltag_36h11:3 "
-                   "apriltag_36h11:7 250mm'; repeat the option for more")
+                   "apriltag_36h11:7 250mm', or a marker and its side, such as 'apriltag_36h11:3 40mm'; repeat "
+                   "the option for more")
       ->allow_extra_args(false);
-  command->add_option(
-      "--board-measured", options->board_measured,
-      "Measured size of the printed board, from its first to its last inner corner, across and down, with "
-      "the "
-      "uncertainty in mm: 225.2x149.9mm:0.05 (0.1 when absent). The print's errors are then solved, too");
+  add_board_measured(command, &options->board_measured);
   command->add_flag(
       "--pixels-not-square", options->pixels_not_square,
       "The cameras' pixels may be not square: take an uneven print for uneven pixels, and do not "
@@ -435,6 +440,7 @@ void add_calibrate(CLI::App& app, Run& run) {
           "--scene", options->scene,
           "Scene whose CAD mesh is aligned to the scan; with --plan the default is the scene of its world")
       ->check(CLI::ExistingPath);
+  add_board_measured(command, &options->board_measured);
   command->add_option("--out", options->out, "Rig folder to write; it also keeps the captures")->required();
   command->add_flag("!--no-scan", options->scan, "Stop after the rig and do not scan the prototype");
   command->add_flag("--all", options->all, "Capture every pose of the plan, even if fewer are enough");

@@ -33,9 +33,8 @@ void print_report(const calib::Report& report) {
     print_out("{:<14} {:>8.3f} {:>9}\n", pose.pose, pose.rms_px, pose.cells);
   for (const calib::ScaleBarCheck& check : report.scale_bar_lengths) {
     if (!check.views.empty())
-      print_out("length {} to {}: expected {:.2f} mm, measured {:.2f} mm, standard deviation {:.2f} mm\n",
-                check.known.from, check.known.to, 1e3 * check.known.length_m, 1e3 * check.measured_m,
-                1e3 * check.stddev_m);
+      print_out("length {}: expected {:.2f} mm, measured {:.2f} mm, standard deviation {:.2f} mm\n",
+                check.known.text(), 1e3 * check.known.length_m, 1e3 * check.measured_m, 1e3 * check.stddev_m);
   }
   for (const calib::Fault& fault : assessment.faults) print_out("fault {}\n", calib::to_text(fault));
   for (const std::string& sentence : report.explanation.advice) print_out("advice: {}\n", sentence);

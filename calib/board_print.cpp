@@ -75,6 +75,12 @@ Result<BoardMeasured> parse_board_measured(const std::string& text) {
 }
 
 Status check_measured(const Board& board, const BoardMeasured& measured) {
+  if (board.is_exact)
+    return error(
+        "board's measured size: expected none for {}, whose text says that it is exact. Leave the measured "
+        "size "
+        "or ':exact' out.",
+        board.text());
   const Vector2d nominal = nominal_lengths(board), found(measured.width_m, measured.height_m);
   if (agree(found, nominal)) return {};
   return error(
@@ -125,6 +131,10 @@ Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board, double
 
 Vector2d print_growth(const Board& board, const Eigen::VectorXd& print) {
   return {2 * print[0] / board.width_m(), 2 * print[1] / board.height_m()};
+}
+
+double smooth_error_m(const Eigen::VectorXd& print) {
+  return print.tail(print.size() - 3).norm() / std::sqrt(2.0);
 }
 
 PrintModes by_print(const Board& board) {

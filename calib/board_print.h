@@ -42,6 +42,8 @@ constexpr double k_print_size = 0.003;
 Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board, double size = k_print_size);
 /// By which share the print is wider (x) and higher (y) than the board's text.
 Eigen::Vector2d print_growth(const Board& board, const Eigen::VectorXd& print);
+/// RMS of the print's smooth errors, m, one coordinate.
+double smooth_error_m(const Eigen::VectorXd& print);
 
 /// Derivatives of the two measured lengths by the parameters; the lengths are means over the rows and columns
 /// of corners.

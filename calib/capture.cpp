@@ -35,10 +35,25 @@ Status capture_image(
   return {};
 }
 
+void add_board_measured(const BoardMeasured& measured, nlohmann::ordered_json* json) {
+  (*json)["board_measured_mm"] = {1e3 * measured.width_m, 1e3 * measured.height_m};
+  (*json)["board_measured_stddev_mm"] = 1e3 * measured.stddev_m;
+}
+
 }  // namespace
 
 Status store_image_now(const std::filesystem::path& path, const cv::Mat& image) {
   return write_png(path, image, {.compression = 1});
+}
+
+Status store_board_measured(const std::filesystem::path& captures, const BoardMeasured& measured) {
+  const auto path = captures / "capture.json";
+  LIMN_TRY(const std::string text, read_file(path));
+  auto json = nlohmann::ordered_json::parse(text, nullptr, false, true);
+  if (!json.is_object())
+    return error("{}: expected a capture file (limn.capture/1), found other text.", path.string());
+  add_board_measured(measured, &json);
+  return write_file(path, json_text(json, 2) + "\n");
 }
 
 Status begin_captures(const CaptureSet& plan) {
@@ -53,11 +68,12 @@ Status begin_captures(const CaptureSet& plan) {
     LIMN_TRY_STATUS(save_patterns(plan.patterns[i], plan.folder / file));
     if (file != "patterns.json") projectors[i]["patterns"] = file;
   }
-  const nlohmann::ordered_json json = {{"schema", "limn.capture/1"},
-                                       {"cameras", devices_json(plan.cameras)},
-                                       {"projectors", projectors},
-                                       {"board", plan.board.text()},
-                                       {"patterns", "patterns.json"}};
+  nlohmann::ordered_json json = {{"schema", "limn.capture/1"},
+                                 {"cameras", devices_json(plan.cameras)},
+                                 {"projectors", projectors},
+                                 {"board", plan.board.text()},
+                                 {"patterns", "patterns.json"}};
+  if (plan.board_measured) add_board_measured(*plan.board_measured, &json);
   return write_file(path, json_text(json, 2) + "\n");
 }
 

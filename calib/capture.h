@@ -36,6 +36,9 @@ struct CaptureBackend {
 /// plan_captures (calib/capture_set.h).
 Status begin_captures(const CaptureSet& plan);
 
+/// Adds the board's measured size to the captures' capture.json.
+Status store_board_measured(const std::filesystem::path& captures, const BoardMeasured& measured);
+
 /// Captures pose number `pose` (0, 1, …): every projector shows its patterns in turn, and every camera
 /// photographs each of them. An image whose size differs from its camera's is an error. Images that were
 /// already taken stay on disk.

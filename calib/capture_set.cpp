@@ -229,8 +229,12 @@ Status make_white_and_black(CaptureSet* captures) {
   return {};
 }
 
+}  // namespace
+
 std::optional<BoardMeasured> read_board_measured(const ConfigNode& root) {
   const auto lengths = root.find("board_measured_mm"), stddev = root.find("board_measured_stddev_mm");
+  if (!lengths && stddev)
+    stddev->problem("expected it beside board_measured_mm, [width, height], found it alone.");
   if (!lengths) return std::nullopt;
   const std::vector<double> mm = lengths->numbers(2);
   if (mm.size() != 2) return std::nullopt;
@@ -241,8 +245,6 @@ std::optional<BoardMeasured> read_board_measured(const ConfigNode& root) {
   return BoardMeasured{1e-3 * mm[0], 1e-3 * mm[1],
                        1e-3 * (stddev ? stddev->positive(k_most_stddev_mm) : 0.1)};
 }
-
-}  // namespace
 
 CaptureSet plan_captures(const fs::path& folder,
                          std::vector<CapturedDevice> cameras,

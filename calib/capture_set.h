@@ -11,6 +11,10 @@
 #include "calib/code/patterns.h"
 #include "core/result.h"
 
+namespace limn {
+class ConfigNode;
+}
+
 namespace limn::calib {
 
 /// A camera or projector of the capture.
@@ -42,6 +46,10 @@ struct CaptureSet {
   /// Keeps images that an import computed (white and black of series that lack them) as long as this exists.
   std::shared_ptr<const void> made_images = {};
 };
+
+/// Reads "board_measured_mm" ([width, height]) and "board_measured_stddev_mm" (0.1 when absent) of a capture
+/// or plan file; none where it has no lengths.
+std::optional<BoardMeasured> read_board_measured(const ConfigNode& root);
 
 /// A captures folder that is about to be filled: patterns of a code for every projector, no poses yet.
 /// Options out of their range throw: the caller must have checked what people entered.

@@ -302,6 +302,23 @@ PixelAspect pixel_aspect(const Solution& solution) {
   return {lens.fy() / lens.fx() - 1, std::sqrt(slope.dot(solution.covariance.topLeftCorner<2, 2>() * slope))};
 }
 
+// What costs less than a tenth of a millimetre of light.
+constexpr double k_least_aspect = 4e-4, k_least_smooth_m = 0.03e-3;
+constexpr double k_better_fit = 0.9;  // share of the corners' scatter; chance changes it by less than a hundredth
+
+bool are_square(const PixelAspect& pixels) {
+  constexpr double k_far = 3;  // standard deviations
+  return std::abs(pixels.value) <= k_far * pixels.stddev + k_square_pixels;
+}
+
+// Whether camera 0's pixels, which seem to be uneven, are square once the print's errors are unknowns.
+bool is_aspect_of_print(const PixelAspect& seen, const PixelAspect& freed) {
+  constexpr double k_certain = 4;  // standard deviations
+  const double size = std::abs(seen.value);
+  return size >= std::max(k_least_aspect, k_certain * seen.stddev) && k_certain * freed.stddev < size &&
+         are_square(freed);
+}
+
 }  // namespace
 
 std::vector<std::string> lens_models(const Observations& observations, const SolveOptions& options) {
@@ -362,20 +379,23 @@ Rig with_distortion_values(Rig rig) {
   return rig;
 }
 
-double uneven_print(const Observations& observations, const SolveOptions& options, const Solution& solution) {
-  constexpr double k_least = 4e-4;               // less costs less than a tenth of a millimetre
-  constexpr double k_certain = 4, k_square = 3;  // standard deviations
-  const PixelAspect seen = pixel_aspect(solution);
-  if (options.board_measured || std::abs(seen.value) < std::max(k_least, k_certain * seen.stddev)) return 0;
+UnevenPrint uneven_print(const Observations& observations,
+                         const SolveOptions& options,
+                         const Solution& solution) {
+  if (observations.board.is_exact || options.board_measured) return {};
   SolveOptions free = options;
   free.print_size = k_print_size;
   const auto freed = solve_from(observations, free, solution);
-  if (!freed) return 0;
-  const PixelAspect pixels = pixel_aspect(*freed);
-  const bool is_known = k_certain * pixels.stddev < std::abs(seen.value);
-  if (!is_known || std::abs(pixels.value) > k_square * pixels.stddev + k_square_pixels) return 0;
+  if (!freed) return {};
   const Vector2d growth = print_growth(observations.board, freed->print);
-  return std::abs(growth.x() - growth.y());
+  const double aspect = std::abs(growth.x() - growth.y()), smooth_m = smooth_error_m(freed->print);
+  const bool is_visible = aspect > k_least_aspect || smooth_m > k_least_smooth_m;
+  const bool fits_better = freed->corner_scatter_px < k_better_fit * solution.corner_scatter_px;
+  const PixelAspect pixels = pixel_aspect(*freed);
+  if (!is_aspect_of_print(pixel_aspect(solution), pixels) && !(is_visible && fits_better)) return {};
+  // Smooth errors also lengthen the sheet, by about as much as they bend its lines.
+  const double half_m = (observations.board.width_m() + observations.board.height_m()) / 4;
+  return {std::hypot(aspect, std::sqrt(3.0) * smooth_m / half_m), are_square(pixels)};
 }
 
 BoardShape board_shape(const Observations& observations, const Solution& solution) {

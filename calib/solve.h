@@ -110,10 +110,17 @@ Solution with_distortion_unknown(const Observations& observations,
                                  Solution solution,
                                  SolveOptions options = {});
 
-/// By which share a print's width and height differ, where the observations show that the print is uneven and
-/// not camera 0's pixels; 0 otherwise. Boards that are rolled tell one from the other: what the pixels do
-/// stays with the image, what the print does turns with the board.
-double uneven_print(const Observations& observations, const SolveOptions& options, const Solution& solution);
+/// The print's errors as a share of its size (difference of width and height, and what its smooth errors may
+/// add), where the observations show that the print has errors; 0 otherwise. They show where the corners fit
+/// better with them, or where camera 0's pixels are square only with them: what the pixels do stays with the
+/// image, what the print does turns with a board that is rolled.
+struct UnevenPrint {
+  double size = 0;
+  bool are_pixels_square = false;  ///< whether camera 0's pixels are, with the print's errors as unknowns
+};
+UnevenPrint uneven_print(const Observations& observations,
+                         const SolveOptions& options,
+                         const Solution& solution);
 
 /// The shape of the board as solved.
 BoardShape board_shape(const Observations& observations, const Solution& solution);

@@ -93,13 +93,16 @@ std::uint32_t u32_at(const std::string& bytes, std::size_t at) {
 
 }  // namespace
 
+std::size_t whole_number(const json& number) {
+  const auto value = number.get<double>();
+  if (!(value >= 0 && value < 9e15 && value == std::floor(value)))
+    throw json::other_error::create(501, fmt::format("{} is not a whole number from 0", value), &number);
+  return static_cast<std::size_t>(value);
+}
+
 std::size_t whole_number(const json& object, const char* key, std::size_t otherwise) {
   const auto found = object.find(key);
-  if (found == object.end() || found->is_null()) return otherwise;
-  const double value = found->get<double>();
-  if (!(value >= 0 && value < 9e15 && value == std::floor(value)))
-    throw json::other_error::create(501, fmt::format("'{}' is not a whole number from 0", key), &object);
-  return static_cast<std::size_t>(value);
+  return found == object.end() || found->is_null() ? otherwise : whole_number(*found);
 }
 
 // The values of an accessor as they are stored.

@@ -55,8 +55,10 @@ class GltfFile {
   std::map<std::size_t, std::string> buffers_, decoded_views_;
 };
 
-/// A whole number of a JSON object, or `otherwise` when it has none. Throws nlohmann::json::exception for
-/// anything else, such as a negative number.
+/// A JSON number as a whole number from 0. Throws nlohmann::json::exception for anything else: a negative
+/// number, one with decimals, one beyond 9e15.
+std::size_t whole_number(const nlohmann::json& number);
+/// The whole number at a key of a JSON object, or `otherwise` when it has none. Throws as above.
 std::size_t whole_number(const nlohmann::json& object, const char* key, std::size_t otherwise);
 
 }  // namespace limn::scene

@@ -122,13 +122,13 @@ class GltfReader {
     std::vector<std::size_t> out;
     if (const auto scenes = root_.find("scenes"); scenes != root_.end() && !scenes->empty()) {
       const json& scene = scenes->at(whole_number(root_, "scene", 0));
-      for (const json& node : scene.value("nodes", json::array())) out.push_back(node.get<std::size_t>());
+      for (const json& node : scene.value("nodes", json::array())) out.push_back(whole_number(node));
       return out;
     }
     std::set<std::size_t> children;
     for (const json& node : nodes())
       for (const json& child : node.value("children", json::array()))
-        children.insert(child.get<std::size_t>());
+        children.insert(whole_number(child));
     for (std::size_t i = 0; i < nodes().size(); ++i)
       if (children.count(i) == 0) out.push_back(i);
     return out;
@@ -150,7 +150,7 @@ class GltfReader {
       shown_.push_back(index);
       const json children = nodes().at(index).value("children", json::array());
       for (auto child = children.rbegin(); child != children.rend(); ++child)
-        left.emplace_back(child->get<std::size_t>(), *file_from_node_[index]);
+        left.emplace_back(whole_number(*child), *file_from_node_[index]);
     }
     return {};
   }
@@ -243,7 +243,7 @@ class GltfReader {
 
   Result<DracoMesh> read_draco(const json& extension) {
     std::map<std::string, std::size_t> ids;
-    for (const auto& [name, id] : extension.at("attributes").items()) ids[name] = id.get<std::size_t>();
+    for (const auto& [name, id] : extension.at("attributes").items()) ids[name] = whole_number(id);
     LIMN_TRY(const std::string_view bytes, file_.view(whole_number(extension, "bufferView", 0)));
     auto mesh = decode_draco(bytes, ids);
     if (!mesh)
@@ -366,7 +366,7 @@ class GltfReader {
     if (skin.contains("inverseBindMatrices"))
       LIMN_TRY_STATUS(read_into(skin, "inverseBindMatrices", 16, &inverse));
     for (const json& joint : skin.at("joints")) {
-      const auto node = joint.get<std::size_t>();
+      const auto node = whole_number(joint);
       const std::size_t at = 16 * file_from_mesh.size();
       if (node >= file_from_node_.size() || !file_from_node_[node] ||
           (!inverse.empty() && at + 16 > inverse.size()))

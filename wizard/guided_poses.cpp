@@ -7,15 +7,16 @@ namespace limn::wizard {
 namespace {
 
 // Position of the board's centre as shares of the image's width and height, its distance as a multiple of the
-// middle distance, and its rotations about the camera's axes.
+// middle distance, and its rotations about the camera's axes. Some boards stand on their sides: what an
+// uneven print does turns with the board, and so is told from the lens.
 struct Stance {
   double across, down, distance, about_x_deg, about_y_deg, turned_deg;
 };
 
 constexpr Stance k_stances[] = {
     {0.50, 0.50, 1.00, 0, 0, 0},     {0.32, 0.40, 1.00, 20, 25, 0},     {0.68, 0.40, 1.00, 20, -25, 0},
-    {0.32, 0.62, 1.00, -25, 20, 10}, {0.68, 0.62, 1.00, -25, -20, -10}, {0.50, 0.35, 1.25, 30, 0, 0},
-    {0.50, 0.66, 1.25, -30, 0, 0},   {0.26, 0.30, 1.35, 10, 30, 20},    {0.74, 0.30, 1.35, 10, -30, -20},
+    {0.32, 0.62, 1.00, -25, 20, 10}, {0.68, 0.62, 1.00, -25, -20, -10}, {0.50, 0.36, 1.25, 30, 0, 90},
+    {0.50, 0.64, 1.25, -30, 0, -90}, {0.26, 0.30, 1.35, 10, 30, 20},    {0.74, 0.30, 1.35, 10, -30, -20},
     {0.26, 0.70, 1.35, -10, 30, 0},  {0.74, 0.70, 1.35, -10, -30, 0},   {0.50, 0.50, 0.80, 15, 15, 90}};
 
 constexpr double k_fill = 0.5;   // share of the image's width or height that the board fills

@@ -242,6 +242,13 @@ class Run {
   std::vector<PoseJudged> poses_;
 };
 
+// Stores the board's measured size with the captures.
+Status store_board_size(const calib::CaptureSet& captures, const WizardListener& listener) {
+  const std::string entered = listener.board_measured ? listener.board_measured() : "";
+  LIMN_TRY(const auto measured, measured_board(captures, entered));
+  return measured ? calib::store_board_measured(captures.folder, *measured) : Status();
+}
+
 // Solves the complete poses as limn solve does.
 Result<calib::Report> solve_all(const WizardOptions& options, const calib::CaptureSet& captures, int poses) {
   SolveCommandOptions solving{.captures = captures.folder, .out = options.out};
@@ -288,8 +295,9 @@ Result<Calibrated> calibrate_rig(const WizardOptions& options,
   const int count = static_cast<int>(places.size());
   LIMN_TRY_STATUS(open_captures(captures, plan_json));
   Run run(captures, backend, listener);
-  const auto solved_all = [&] {
+  const auto solved_all = [&]() -> Result<calib::Report> {
     if (listener.step) listener.step(WizardStep::solve, WizardState::runs, "");
+    LIMN_TRY_STATUS(store_board_size(captures, listener));
     return solve_all(options, captures, count);
   };
   std::optional<calib::Report> report;

@@ -31,6 +31,8 @@ struct WizardListener {
   /// A pose was judged; the observations are those of all poses so far.
   std::function<void(const PoseJudged&, const calib::Observations&, const std::vector<calib::Fault>&)>
       judged = nullptr;
+  /// The board's size as a person has entered it so far (calib/board_print.h); empty: not entered.
+  std::function<std::string()> board_measured = nullptr;
   std::atomic<WizardWish>* wish = nullptr;  ///< a person's request; set to none when it is followed
 };
 

@@ -18,6 +18,8 @@ const std::map<std::string, BoardKind> k_plain_kinds = {{"chessboard", BoardKind
                                                         {"circles", BoardKind::circles},
                                                         {"acircles", BoardKind::asymmetric_circles}};
 
+constexpr std::string_view k_exact = ":exact";
+
 // Radius of printed circles, as a share of the spacing.
 constexpr double k_circle_radius = 0.25, k_shifted_radius = 0.45;
 
@@ -104,6 +106,22 @@ Status read_aprilgrid_fields(const std::string& text, const std::string& gap, Bo
   return {};
 }
 
+std::string grid_text(const Board& board) {
+  const double mm = board.square_m * 1e3;
+  for (const auto& [name, plain] : k_plain_kinds)
+    if (plain == board.kind)
+      return fmt::format("{}:{}x{}:{:.10g}mm", name, board.columns - 1, board.rows - 1, mm);
+  if (board.kind == BoardKind::aprilgrid)
+    return fmt::format("aprilgrid:{}x{}:{:.10g}mm:{:.10g}", board.columns / 2, board.rows / 2, mm,
+                       board.gap_share);
+  std::string base = fmt::format("charuco:{}x{}:{:.10g}mm", board.columns, board.rows, mm);
+  const bool plain_share = board.marker_share == 0.75;
+  if (!plain_share || board.dictionary != default_dictionary(marker_count(board)))
+    base += ":" + board.dictionary;
+  if (!plain_share) base += fmt::format(":{:.10g}", board.marker_share);
+  return base;
+}
+
 // Pixels of a square and of a marker's cell: whole cells, equal margins, and if possible a whole number of
 // pixels per metre, because a PNG's pHYs is a whole number.
 struct PixelGrid {
@@ -161,6 +179,11 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board) {
 }
 
 Result<Board> Board::parse(const std::string& text) {
+  if (text.ends_with(k_exact)) {
+    LIMN_TRY(Board board, parse(text.substr(0, text.size() - k_exact.size())));
+    board.is_exact = true;
+    return board;
+  }
   constexpr auto k_forms =
       "charuco:11x8:25mm, charuco:11x8:25mm:aruco_5x5_100:0.7, chessboard:9x7:75mm, aprilgrid:6x6:88mm:0.3, "
       "circles:11x7:20mm or acircles:4x11:20mm";
@@ -201,18 +224,7 @@ Result<Board> Board::parse(const std::string& text) {
   return board;
 }
 
-std::string Board::text() const {
-  const double mm = square_m * 1e3;
-  for (const auto& [name, plain] : k_plain_kinds)
-    if (plain == kind) return fmt::format("{}:{}x{}:{:.10g}mm", name, columns - 1, rows - 1, mm);
-  if (kind == BoardKind::aprilgrid)
-    return fmt::format("aprilgrid:{}x{}:{:.10g}mm:{:.10g}", columns / 2, rows / 2, mm, gap_share);
-  std::string base = fmt::format("charuco:{}x{}:{:.10g}mm", columns, rows, mm);
-  const bool plain_share = marker_share == 0.75;
-  if (!plain_share || dictionary != default_dictionary(marker_count(*this))) base += ":" + dictionary;
-  if (!plain_share) base += fmt::format(":{:.10g}", marker_share);
-  return base;
-}
+std::string Board::text() const { return grid_text(*this) + (is_exact ? std::string(k_exact) : ""); }
 
 Eigen::Vector3d Board::p_corner(int id) const {
   const int column = id % (columns - 1), row = id / (columns - 1);

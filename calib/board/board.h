@@ -27,6 +27,8 @@ enum class BoardKind { charuco, chessboard, aprilgrid, circles, asymmetric_circl
 ///   `circles:11x7:20mm`                        11 x 7 black circles, 20 mm from centre to centre
 ///   `acircles:4x11:20mm`                       OpenCV's asymmetric grid: 11 rows of 4 circles, 20 mm apart;
 ///                                              circles of a row are 40 mm apart, every second row is shifted
+/// `:exact` behind each of these names a target without errors (glass, aluminium, measured): its squares are
+/// as large as the text says, and no error of a print is looked for.
 /// A circle grid's corners are the centres of its circles; its outermost ones lie one spacing from the
 /// board's origin and edges. The circles' radius is measured in the images. Defaults: the smallest aruco_4x4
 /// dictionary that has enough markers; 0.75 (whole cells: 8 to a square).
@@ -38,6 +40,7 @@ struct Board {
   double gap_share = 0;     ///< AprilGrid: the narrow squares' side / the tags'
   std::string dictionary;   ///< ChArUco: OpenCV's predefined dictionary, `aruco_4x4_50`
   double marker_share = 0;  ///< ChArUco: the marker's side / the square's side
+  bool is_exact = false;    ///< whether it is known to be as its text says
 
   static Result<Board> parse(const std::string& text);
   std::string text() const;

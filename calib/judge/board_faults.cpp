@@ -84,7 +84,7 @@ double common_stretch(const Rig& rig) {
 void note_print(const Board& board, const Solution& solution, std::vector<Fault>* faults) {
   constexpr double k_aspect = 4e-4, k_smooth_m = 0.05e-3;  // what prints on glass or aluminium keep
   const Vector2d growth = print_growth(board, solution.print);
-  const double smooth = solution.print.tail(solution.print.size() - 3).norm() / std::sqrt(2.0);
+  const double smooth = smooth_error_m(solution.print);
   if (std::abs(growth.x() - growth.y()) < k_aspect && smooth < k_smooth_m) return;
   faults->push_back(
       {FaultName::uneven_print,
@@ -132,7 +132,7 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
   const double allowed = std::max(k_offset_m, k_offset_share * width);
   if (bend > std::max(k_bend_m, k_bend_share * width) || offsets.out_m > allowed)
     faults.push_back(
-        {FaultName::bent_board,
+        {FaultName::board_not_flat,
          fmt::format(
              "the board differs from flat by {:.1f} mm over its width and height (bends of {:.1f} and {:.1f} "
              "mm, a twist of {:.1f} mm); its corners differ from that shape by {:.2f} mm RMS",

@@ -20,7 +20,7 @@ struct BoardOffsets {
 BoardOffsets board_offsets(const Observations& observations, const Solution& solution);
 
 /// Detects:
-/// - bent_board: the solved bend, or the offsets out of the sheet, are larger than a flat sheet's;
+/// - board_not_flat: the solved bend, or the offsets out of the sheet, are larger than a flat sheet's;
 /// - wrong_square_size: squares are wider than high (or the reverse), because cameras and projectors alike
 ///   would need unequal focal lengths, or corners are not at their nominal positions.
 std::vector<Fault> board_faults(const Observations& observations, const Solution& solution);

@@ -212,7 +212,7 @@ void erase_implied(std::vector<Fault>* faults) {
     return (board && (fault.name == FaultName::wrong_camera_resolution ||
                       fault.name == FaultName::keystone_or_scaling)) ||
            (panel && fault.name == FaultName::wrong_camera_resolution) ||
-           (image && fault.name == FaultName::bent_board);
+           (image && fault.name == FaultName::board_not_flat);
   });
 }
 

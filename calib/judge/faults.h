@@ -26,7 +26,7 @@ enum class FaultName {
   keystone_or_scaling,
   wrong_camera_resolution,
   rotated_projection,
-  bent_board,
+  board_not_flat,
   wrong_square_size,
   projectors_swapped,
   wrong_display,
@@ -54,7 +54,7 @@ inline constexpr EnumNames<FaultName, 26> k_fault_names{{"board_not_visible",
                                                          "keystone_or_scaling",
                                                          "wrong_camera_resolution",
                                                          "rotated_projection",
-                                                         "bent_board",
+                                                         "board_not_flat",
                                                          "wrong_square_size",
                                                          "projectors_swapped",
                                                          "wrong_display",
@@ -95,7 +95,7 @@ struct Fault {
 /// - odd_pose: a pose that odd_poses() (calib/cross_validation.h) names, with a held-out error that is not
 /// good;
 /// - rotated_projection: the image is upside down and no ceiling-mounted projector explains it;
-/// - bent_board, wrong_square_size: calib/judge/board_faults.h.
+/// - board_not_flat, wrong_square_size: calib/judge/board_faults.h.
 /// `devices` and `held_out` may be empty; the faults that need them are then not checked.
 std::vector<Fault> faults(const Observed& observed,
                           const Solution& solution,

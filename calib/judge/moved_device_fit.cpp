@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 
+#include "calib/board_print.h"
 #include "core/least_squares.h"
 
 namespace limn::calib {
@@ -28,7 +29,7 @@ class Fit {
       : observations_(observations),
         options_(options),
         free_(free),
-        shape_{observations.board.width_m(), observations.board.height_m()} {
+        shape_{observations.board.width_m(), observations.board.height_m(), options.twist_m} {
     int at = free_.device == MoveHypothesis::k_nobody ? 0 : 6;
     for (const bool is_free : free_.boards) {
       board_at_.push_back(is_free ? at : -1);
@@ -206,7 +207,7 @@ class Fit {
       Row row = empty_row();
       Vector2d px;
       if (!predict_corner(view_of(places.camera(seen.camera)), *board, shape_, places.bend,
-                          observations_.board.p_corner(seen.corner).head<2>(), &px, &by))
+                          printed_corner(observations_.board, options_.print, seen.corner), &px, &by))
         continue;
       row.residual = px - seen.px;
       put(by.camera_pose, device_at(static_cast<size_t>(seen.camera)), &row);

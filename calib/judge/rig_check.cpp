@@ -7,6 +7,7 @@
 #include <numbers>
 #include <span>
 
+#include "calib/board_print.h"
 #include "calib/judge/moved_device_fit.h"
 #include "calib/measurement_model.h"
 #include "calib/seed.h"
@@ -200,11 +201,12 @@ class RigChecker {
   // points lie on its own rays: their residuals are in the imagers that observe them.
   template <typename Visit>
   void each(const RigCheckPlaces& places, size_t device, Visit visit) const {
-    const BoardShape shape{observations_.board.width_m(), observations_.board.height_m()};
+    const BoardShape shape{observations_.board.width_m(), observations_.board.height_m(), options_.twist_m};
     for (const CornerObservation& seen : observations_.corners) {
       const auto& board = places.world_from_board[static_cast<size_t>(seen.pose)];
       if (static_cast<size_t>(seen.camera) != device || !board) continue;
       Eigen::Vector3d p = observations_.board.p_corner(seen.corner);
+      p.head<2>() = printed_corner(observations_.board, options_.print, seen.corner);
       p.z() = shape.z(places.bend, p.x(), p.y());
       visit(places.devices[device].project(*board * p), seen.px, *board * p);
     }

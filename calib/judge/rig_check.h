@@ -27,6 +27,9 @@ struct RigCheckOptions {
   /// calibration's are assumed flat to this.
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
   double bend_stddev_m = 0.0005;
+  /// The board's known twist and print (Solution::twist_m, Solution::print); an empty print is exact.
+  double twist_m = 0;
+  Eigen::VectorXd print = {};
   /// For each pose: where its board stood when the rig was sound, if nobody has touched it since. Such a
   /// board distinguishes a moved camera from a moved projector where there is only one of each.
   std::vector<std::optional<Pose>> still_boards = {};

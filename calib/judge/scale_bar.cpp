@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
+#include <utility>
 
 #include "calib/code/decode.h"
 #include "calib/surface/triangulate.h"
@@ -77,6 +78,7 @@ struct Centre {
   Vector3d p_world;
   double along_m = 0, across_m = 0;
   Vector3d d_ray;
+  double side_m = 0;  // mean of the four sides of the mark, in the paper's plane
 };
 
 // Number of independent labels: neighbours within one projector pixel share their error.
@@ -94,6 +96,24 @@ double independent(const std::vector<Spot>& spots, double pixels) {
   // Area of one camera pixel in projector pixels.
   const double area = std::abs((normal.inverse() * product).determinant());
   return std::clamp(area * pixels, 4.0, pixels);
+}
+
+// Mean length of the mark's sides, which lie in a plane: its inverse depth is plane . (1, x - m_x, y - m_y).
+double side_in_plane(const Imager& camera,
+                     const DetectedMark& mark,
+                     const Vector3d& plane,
+                     const Vector2d& m) {
+  std::array<Vector3d, 4> corners;
+  for (size_t i = 0; i < 4; ++i) {
+    const auto d = camera.lens.unproject(mark.corners_px[i]);
+    if (!d) return 0;
+    const Vector2d at = d->head<2>() / d->z();
+    const double depth = 1 / plane.dot(Vector3d(1, at.x() - m.x(), at.y() - m.y()));
+    corners[i] = depth * Vector3d(at.x(), at.y(), 1);
+  }
+  double sum = 0;
+  for (size_t i = 0; i < 4; ++i) sum += (corners[(i + 1) % 4] - corners[i]).norm() / 4;
+  return sum;
 }
 
 // On a plane, the inverse depth along the camera's axis is an affine function of direction.
@@ -148,6 +168,7 @@ std::optional<Centre> centre_of(const Imager& camera,
     const double leverage = normal.inverse()(0, 0) * count / independent(spots, count);
     centre.along_m = sigma * std::sqrt(leverage) * depth * depth / middle->z();
     centre.across_m = mark.stddev_px / 2 * depth / camera.lens.fx();  // mean of four corners
+    centre.side_m = side_in_plane(camera, mark, plane, m);
     return centre;
   }
 }
@@ -157,11 +178,21 @@ struct Pair {
   std::vector<Spot> spots_a, spots_b;
 };
 
+double length_between(const Centre& a, const Centre& b, bool is_side) {
+  return is_side ? a.side_m : (a.p_world - b.p_world).norm();
+}
+
 std::optional<double> length_of(const Imager& camera, const Imager& projector, const Pair& pair) {
   const auto a = centre_of(camera, projector, *pair.a, pair.spots_a),
              b = centre_of(camera, projector, *pair.b, pair.spots_b);
   if (!a || !b) return std::nullopt;
-  return (a->p_world - b->p_world).norm();
+  return length_between(*a, *b, pair.a == pair.b);
+}
+
+// The noise of a side: it is as much too long as the paper is too far away; and the noise of its ends.
+double side_noise_of(const Centre& centre, const Imager& camera) {
+  const double depth = (camera.imager_from_world * centre.p_world).z();
+  return std::hypot(centre.side_m * centre.along_m / depth, centre.across_m);
 }
 
 double noise_of(const Centre& a, const Centre& b) {
@@ -231,8 +262,10 @@ void measure_view(const Solution& solution,
   const Pair pair{&a, &b, paper_spots(decoded, a.corners_px), paper_spots(decoded, b.corners_px)};
   const auto from = centre_of(eye, light, a, pair.spots_a), to = centre_of(eye, light, b, pair.spots_b);
   if (!from || !to) return;
-  check->views.push_back({a.camera, projector, a.pose, (from->p_world - to->p_world).norm(),
-                          noise_of(*from, *to), calibration_of(solution, a.camera, projector, pair)});
+  const bool is_side = &a == &b;
+  check->views.push_back({a.camera, projector, a.pose, length_between(*from, *to, is_side),
+                          is_side ? side_noise_of(*from, eye) : noise_of(*from, *to),
+                          calibration_of(solution, a.camera, projector, pair)});
 }
 
 void conclude(double widened, ScaleBarCheck* check) {
@@ -254,21 +287,30 @@ void conclude(double widened, ScaleBarCheck* check) {
 
 }  // namespace
 
+std::string ScaleBar::text() const {
+  return is_side() ? "the side of " + from : fmt::format("{} to {}", from, to);
+}
+
 Result<ScaleBar> parse_scale_bar(const std::string& text) {
   std::istringstream words(text);
   ScaleBar known;
   std::string length, surplus;
-  words >> known.from >> known.to >> length;
+  words >> known.from >> known.to;
+  const bool has_two = known.to.find(':') != std::string::npos;
+  if (has_two)
+    words >> length;
+  else
+    length = std::exchange(known.to, known.from);
   double value = 0;
   const auto [rest, problem] = std::from_chars(length.data(), length.data() + length.size(), value);
   const std::string unit = rest;  // the text is zero-terminated
   const double factor = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
   known.length_m = value * factor;
   if (words.fail() || words >> surplus || problem != std::errc() || !(known.length_m > 0) ||
-      !std::isfinite(known.length_m) || known.from == known.to)
+      !std::isfinite(known.length_m) || (has_two && known.from == known.to))
     return error(
         "known length '{}': expected two markers and their distance, such as 'apriltag_36h11:3 "
-        "apriltag_36h11:7 250mm'.",
+        "apriltag_36h11:7 250mm', or a marker and its side, such as 'apriltag_36h11:3 40mm'.",
         text);
   return known;
 }
@@ -306,12 +348,11 @@ Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures
 
 std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board) {
   const ScaleBar& known = check.known;
-  const std::string name = fmt::format("{} to {}", known.from, known.to);
+  const std::string name = known.text();
   if (check.views.empty())
     return Fault{FaultName::scale_bar_not_seen,
-                 fmt::format("in no pose are both ends of {} seen by a camera and lit by a projector", name),
-                 "place the bar where a camera sees both markers and a projector lights them",
-                 Severity::note};
+                 fmt::format("in no pose is {} seen whole by a camera and lit by a projector", name),
+                 "place it where a camera sees it and a projector lights it", Severity::note};
   const double difference = check.measured_m - known.length_m, share = difference / known.length_m;
   if (std::abs(difference) <= 3 * check.stddev_m || std::abs(share) <= k_scale_tolerance) return std::nullopt;
   return Fault{

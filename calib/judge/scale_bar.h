@@ -14,13 +14,17 @@
 namespace limn::calib {
 
 /// A scale bar: a measured distance between the centres of two markers on one stiff object, such as a printed
-/// bar. It is independent of the board, so it detects a board of a wrong size.
+/// bar, or the side of one marker's black square. It is independent of the board, so it detects a board of a
+/// wrong size.
 struct ScaleBar {
-  std::string from, to;  ///< `family:id`
+  std::string from, to;  ///< `family:id`; `to` is `from` for the side of one marker
   double length_m = 0;
+  bool is_side() const { return from == to; }
+  std::string text() const;  ///< "A to B", "the side of A"
 };
 
-/// "apriltag_36h11:3 apriltag_36h11:7 250mm" (mm, cm or m).
+/// "apriltag_36h11:3 apriltag_36h11:7 250mm", or "apriltag_36h11:3 40mm" for the side of one marker (mm, cm
+/// or m).
 Result<ScaleBar> parse_scale_bar(const std::string& text);
 
 /// A square mark in a camera's image of one pose.

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <optional>
 
+#include "calib/board_print.h"
+
 namespace limn::calib {
 namespace {
 
@@ -256,16 +258,28 @@ std::string reason(const Assessment& assessment, double mm) {
   return reasons.empty() ? "" : "Why not better: " + joined(reasons) + ".";
 }
 
+// Which length to measure, and how to give it.
+std::string length_to_measure(const Board& board) {
+  const Vector2d mm = 1e3 * nominal_lengths(board);
+  return fmt::format(
+      "Measure the board from its first to its last {}, across and down (its text says {:.1f} and {:.1f} "
+      "mm), and "
+      "give the lengths with --board-measured; everything is as much too large or too small as the board.",
+      board.is_circles() ? "circle's centre" : "inner corner", mm.x(), mm.y());
+}
+
 // The verdict on cameras alone.
-std::string camera_words(const Observations& observations, const Assessment& assessment) {
+std::string camera_words(const Observations& observations,
+                         const Assessment& assessment,
+                         const std::string& condition) {
   const auto& lenses = assessment.lens_stddev_px;
   const auto worst = std::max_element(lenses.begin(), lenses.end());
   std::string text = fmt::format(
       "{}: held-out error (corners of poses that the solve has not used) {:.2f} px; the lens of {} is known "
       "to "
-      "{:.2f} px (standard deviation over its image)",
+      "{:.2f} px (standard deviation over its image){}",
       to_text(assessment.verdict), assessment.held_out.rms_px,
-      observations.cameras[static_cast<size_t>(worst - lenses.begin())].name, *worst);
+      observations.cameras[static_cast<size_t>(worst - lenses.begin())].name, *worst, condition);
   if (assessment.verdict == Verdict::good) return text + ".";
   const bool reject = assessment.verdict == Verdict::reject;
   const double limit = reject ? k_usable_lens_px : k_good_lens_px;
@@ -276,8 +290,15 @@ std::string camera_words(const Observations& observations, const Assessment& ass
   return text + "." + (why.empty() ? "" : " " + why);
 }
 
-std::string verdict_words(const Observations& observations, const Assessment& assessment) {
-  if (observations.projectors.empty()) return camera_words(observations, assessment);
+std::string verdict_words(const Observations& observations,
+                          const Assessment& assessment,
+                          bool is_scale_checked) {
+  const std::string condition =
+      is_scale_checked
+          ? ""
+          : fmt::format(", if the board is as large as its text says ({}), which nothing has checked",
+                        observations.board.text());
+  if (observations.projectors.empty()) return camera_words(observations, assessment, condition);
   const auto worst =
       std::max_element(assessment.predicted_error_mm.begin(), assessment.predicted_error_mm.end());
   const auto projector = static_cast<size_t>(worst - assessment.predicted_error_mm.begin());
@@ -293,6 +314,7 @@ std::string verdict_words(const Observations& observations, const Assessment& as
   });
   if (const auto place = map == maps.end() ? std::nullopt : worst_place(observations, *map))
     text += " (" + *place + ")";
+  text += condition;
   const auto& poses = assessment.held_out.poses;
   const auto pose =
       std::max_element(poses.begin(), poses.end(),
@@ -313,10 +335,14 @@ bool rests_on_enough_poses(const Assessment& assessment, int poses) {
   return is_fine || poses >= k_enough_poses;
 }
 
-Explanation explain(const Observed& observed, const Solution& solution, const Assessment& assessment) {
+Explanation explain(const Observed& observed,
+                    const Solution& solution,
+                    const Assessment& assessment,
+                    bool is_scale_checked) {
   const Observations& observations = observed.observations;
   Explanation words;
-  words.verdict = verdict_words(observations, assessment);
+  words.verdict = verdict_words(observations, assessment, is_scale_checked);
+  if (!is_scale_checked) words.advice.push_back(length_to_measure(observations.board));
   for (const Fault& fault : assessment.advice) words.advice.push_back(to_text(fault));
   advise_edges(observations, &words.advice);
   advise_stances(stances(observations, solution), assessment, &words.advice);

@@ -26,7 +26,11 @@ bool rests_on_enough_poses(const Assessment& assessment, int poses);
 
 /// Derives verdict and advice from the data alone: which regions of the imagers' images have no observations,
 /// how the boards were tilted and how far away they were, where the predicted error grows, and the normalised
-/// and epipolar residuals.
-Explanation explain(const Observed& observed, const Solution& solution, const Assessment& assessment);
+/// and epipolar residuals. `is_scale_checked`: something besides the board's text says how large the board
+/// is; otherwise the verdict's first sentence names that condition.
+Explanation explain(const Observed& observed,
+                    const Solution& solution,
+                    const Assessment& assessment,
+                    bool is_scale_checked = true);
 
 }  // namespace limn::calib

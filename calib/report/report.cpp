@@ -14,16 +14,21 @@ using Json = nlohmann::ordered_json;
 
 std::string provenance(const Report& report, const SolveOptions& options) {
   const Observations& observations = report.observed.observations;
-  return json_text(
-      Json{{"made_by", "limn solve"},
-           {"board", observations.board.text()},
-           {"board_bend_mm",
-            {rounded(report.solution.bend_m.x() * 1e3), rounded(report.solution.bend_m.y() * 1e3)}},
-           {"poses", observations.poses},
-           {"corners", observations.corners.size()},
-           {"matches", observations.matches.size()},
-           {"lens_models", lens_models(observations, options)},
-           {"held_out_px", rounded(report.assessment.held_out.rms_px)}});
+  Json json = {{"made_by", "limn solve"},
+               {"board", observations.board.text()},
+               {"board_bend_mm",
+                {rounded(report.solution.bend_m.x() * 1e3), rounded(report.solution.bend_m.y() * 1e3)}},
+               {"poses", observations.poses},
+               {"corners", observations.corners.size()},
+               {"matches", observations.matches.size()},
+               {"lens_models", lens_models(observations, options)},
+               {"held_out_px", rounded(report.assessment.held_out.rms_px)}};
+  if (report.solution.print.size() > 0) {
+    json["board_twist_mm"] = rounded(1e3 * report.solution.twist_m);
+    json["board_print_mm"] = Json::array();
+    for (const double mode : report.solution.print) json["board_print_mm"].push_back(1e3 * mode);
+  }
+  return json_text(json);
 }
 
 }  // namespace

@@ -262,7 +262,7 @@ std::string lengths_table(const Report& report) {
   std::vector<std::vector<std::string>> rows;
   for (const ScaleBarCheck& check : report.scale_bar_lengths) {
     const double expected = 1e3 * check.known.length_m, measured = 1e3 * check.measured_m;
-    const std::string name = check.known.from + " to " + check.known.to;
+    const std::string name = check.known.text();
     if (check.views.empty()) {
       rows.push_back({name, fmt::format("{:.2f}", expected), "not seen", "", "0"});
       continue;

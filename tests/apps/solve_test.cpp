@@ -175,6 +175,8 @@ TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
   EXPECT_GT(report["decode"]["share"], 0.9);
   EXPECT_GT(report["decode"]["share_of_contrasted"], 0.8);
   EXPECT_LE(report["decode"]["share_of_contrasted"], report["decode"]["share"]);
+  EXPECT_EQ(report["scale_rests_on"], "board");
+  EXPECT_NE(report["words"].get<std::string>().find("which nothing has checked"), std::string::npos);
   EXPECT_LT(report["predicted_error_mm"]["p95"], 0.5);
   EXPECT_EQ(report["devices"].size(), 2U);
   EXPECT_TRUE(report["seconds"].contains("total"));
@@ -387,10 +389,17 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
       {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
   for (const int pose : {6, 7}) truth.capture_bar(plan, pose);
   wizard::SolveCommandOptions options{.captures = captures, .out = out};
-  options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm"};
+  options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm", "apriltag_36h11:3 64mm"};
   const auto right = wizard::solve_captures(options);
   ASSERT_TRUE(right.ok()) << right.message();
-  ASSERT_EQ(right->scale_bar_lengths.size(), 1U);
+  ASSERT_EQ(right->scale_bar_lengths.size(), 2U);
+  const calib::ScaleBarCheck& side = right->scale_bar_lengths[1];
+  EXPECT_EQ(side.views.size(), 2U);
+  EXPECT_NEAR(side.measured_m, 0.064, 0.0005);
+  EXPECT_LT(std::abs(side.measured_m - 0.064), 3.5 * side.stddev_m);
+  EXPECT_LT(side.stddev_m, 0.0005);
+  EXPECT_EQ(right->scale_rests_on, "known_length");
+  EXPECT_EQ(right->explanation.verdict.find("nothing has checked"), std::string::npos);
   const calib::ScaleBarCheck& check = right->scale_bar_lengths[0];
   EXPECT_EQ(check.views.size(), 2U);
   EXPECT_NEAR(check.measured_m, 0.250, 0.0015);
@@ -420,7 +429,8 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   const auto unseen = wizard::solve_captures(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
   EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::scale_bar_not_seen);
-  for (const char* nonsense : {"", "apriltag_36h11:3 250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
+  for (const char* nonsense :
+       {"", "apriltag_36h11:3", "250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
     EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
 }
 

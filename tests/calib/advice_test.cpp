@@ -108,8 +108,8 @@ TEST(Advice, TheVerdictNamesProjectorPoseAndReason) {
   EXPECT_NE(words.find("the predicted error is above 1 mm, the limit of good"), std::string::npos) << words;
   judged.assessment.faults = {{FaultName::odd_pose, "pose03", ""},
                               {FaultName::odd_pose, "pose04", ""},
-                              {FaultName::bent_board, "bent", "flatten it"}};
-  EXPECT_NE(judged.words().verdict.find("faults were found: odd_pose and bent_board"), std::string::npos)
+                              {FaultName::board_not_flat, "bent", "flatten it"}};
+  EXPECT_NE(judged.words().verdict.find("faults were found: odd_pose and board_not_flat"), std::string::npos)
       << judged.words().verdict;
   judged.assessment.predicted_error_mm = {0.8, 0.9};
   judged.assessment.held_out_error_mm = {0.05, 0.05};

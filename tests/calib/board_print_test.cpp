@@ -9,6 +9,7 @@
 #include "calib/judge/assess.h"
 #include "calib/measurement_model.h"
 #include "calib/solve.h"
+#include "tests/calib/bad_print.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"
 
@@ -21,41 +22,20 @@ using Eigen::Vector2d;
 constexpr double k_pnp_px = 0.02;
 constexpr double k_bend_m = 0.4e-3;
 
-// A print that is 0.15 % wider than it is high, with smooth errors of 0.1 mm (waves, which no polynomial of
-// the solve is), on a board that is bowed and twisted.
-struct Print {
-  double aspect = 0.0015, smooth_m = 0.1e-3;
-  double phase = 0.7;
-
-  Vector2d at(const calib::Board& board, const Vector2d& p) const {
-    const double x = p.x() / board.width_m(), y = p.y() / board.height_m(), tau = 2 * std::numbers::pi;
-    return {p.x() * (1 + aspect) + smooth_m * std::sin(tau * (0.7 * x + 0.5 * y) + phase),
-            p.y() + smooth_m * std::cos(tau * (0.4 * x - 0.7 * y) + 2 * phase)};
-  }
-  // From the first to the last inner corner, as means over rows and columns.
-  Vector2d lengths(const calib::Board& board) const {
-    Vector2d sum = Vector2d::Zero();
-    const int columns = board.columns - 1, rows = board.rows - 1;
-    const auto corner = [&](int column, int row) {
-      return at(board, board.p_corner(row * columns + column).head<2>());
-    };
-    for (int row = 0; row < rows; ++row) sum.x() += (corner(columns - 1, row) - corner(0, row)).x() / rows;
-    for (int column = 0; column < columns; ++column)
-      sum.y() += (corner(column, rows - 1) - corner(column, 0)).y() / columns;
-    return sum;
-  }
-};
-
 struct Printed {
   TrueRig truth;
   calib::Observations observations;
 };
 
-Printed printed(const Print& print, unsigned seed, std::mt19937_64* rng) {
+Printed printed(const BadPrint& print, unsigned seed, std::mt19937_64* rng, bool has_turns = false) {
   Printed made;
-  made.truth = make_true_rig({.k1 = -0.05, .shift = 0.5, .poses = 12, .seed = seed});
-  Imager& camera = made.truth.rig.cameras[0];
-  camera.lens.values[1] = camera.lens.values[0];  // square pixels
+  made.truth = make_true_rig({.k1 = -0.05,
+                              .shift = 0.5,
+                              .poses = 12,
+                              .square_pixels = true,
+                              .quarter_turns = has_turns,
+                              .seed = seed});
+  const Imager& camera = made.truth.rig.cameras[0];
   made.truth.bow_m = {k_bend_m, 0};
   made.truth.twist_m = k_bend_m;
   made.observations = observed_perfectly(made.truth, 4);
@@ -130,7 +110,7 @@ TEST(BoardPrint, LengthsMakeUpForABadPrint) {
   for (const double stddev_m : {0.03e-3, 0.1e-3}) {
     std::vector<double> place, moved, turned, ratios, without;
     for (unsigned seed = 1; seed <= 4; ++seed) {
-      const Print print{.phase = 0.9 * seed};
+      const BadPrint print{.phase = 0.9 * seed};
       const Printed made = printed(print, seed, &rng);
       std::normal_distribution<double> error(0, stddev_m);
       const Vector2d lengths = print.lengths(made.truth.board) + Vector2d(error(rng), error(rng));
@@ -156,38 +136,49 @@ TEST(BoardPrint, LengthsMakeUpForABadPrint) {
   }
 }
 
+// Boards in quarter turns show the print in the corners' residuals, others in the shape of the pixels.
 TEST(BoardPrint, AnUnevenPrintShowsWithoutLengthsAndUnevenPixelsAreNotTakenForOne) {
   std::mt19937_64 rng = test_rng();
-  std::vector<double> ratios, solved, exact;
-  for (unsigned seed = 1; seed <= 4; ++seed) {
-    const Printed made = printed({.phase = 0.9 * seed}, seed, &rng);
-    const calib::Solution plain = calib::solve(made.observations).value();
-    const double uneven = calib::uneven_print(made.observations, {}, plain);
-    EXPECT_GT(uneven, 0.0006);  // 0.0015 by its size alone; the smooth errors grow it or shrink it
-    EXPECT_LT(uneven, 0.004);
-    const Judged with = judged(made, {.print_size = uneven, .square_pixels = true}, &rng);
-    for (const double e : with.landed.pooled_mm()) {
-      ratios.push_back(e / with.stated_mm);
-      solved.push_back(e);
+  for (const bool has_turns : {false, true}) {
+    std::vector<double> ratios, solved, exact;
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      const Printed made = printed({.phase = 0.9 * seed}, seed, &rng, has_turns);
+      const calib::Solution plain = calib::solve(made.observations).value();
+      const calib::UnevenPrint uneven = calib::uneven_print(made.observations, {}, plain);
+      EXPECT_GT(uneven.size, 0.0006);  // 0.0015 by its size alone; the smooth errors grow it or shrink it
+      EXPECT_LT(uneven.size, 0.004);
+      EXPECT_TRUE(uneven.are_pixels_square);
+      const Judged with = judged(made, {.print_size = uneven.size, .square_pixels = true}, &rng);
+      for (const double e : with.landed.pooled_mm()) {
+        ratios.push_back(e / with.stated_mm);
+        solved.push_back(e);
+      }
+      for (const double e : judged(made, {}, &rng).landed.pooled_mm()) exact.push_back(e);
+      EXPECT_TRUE(std::any_of(with.assessment.faults.begin(), with.assessment.faults.end(),
+                              [](const calib::Fault& f) {
+                                return f.name == calib::FaultName::uneven_print &&
+                                       f.severity == calib::Severity::doubt;
+                              }))
+          << calib::to_text(with.assessment.faults);
     }
-    for (const double e : judged(made, {}, &rng).landed.pooled_mm()) exact.push_back(e);
-    EXPECT_TRUE(std::any_of(with.assessment.faults.begin(), with.assessment.faults.end(),
-                            [](const calib::Fault& f) {
-                              return f.name == calib::FaultName::uneven_print &&
-                                     f.severity == calib::Severity::doubt;
-                            }))
-        << calib::to_text(with.assessment.faults);
+    printf("[ print    ] without lengths: %.3f mm RMS, as an exact board %.3f mm; stated holds for %.1f %%\n",
+           rms(solved), rms(exact), 100 * share_within(ratios, 1));
+    EXPECT_GT(share_within(ratios, 1), 0.9);
+    EXPECT_LT(rms(solved), rms(exact));
   }
-  printf("[ print    ] without lengths: %.3f mm RMS, as an exact board %.3f mm; stated holds for %.1f %%\n",
-         rms(solved), rms(exact), 100 * share_within(ratios, 1));
-  EXPECT_GT(share_within(ratios, 1), 0.9);
-  EXPECT_LT(rms(solved), rms(exact));
+}
 
-  const TrueRig truth =
-      make_true_rig({.k1 = -0.05, .shift = 0.5, .seed = 5});  // its pixels are 0.13 % uneven
-  calib::Observations observations = observed_perfectly(truth, 4);
-  add_noise(0.015, 0.03, &rng, &observations);
-  EXPECT_EQ(calib::uneven_print(observations, {}, calib::solve(observations).value()), 0);
+TEST(BoardPrint, AnExactBoardIsNotTakenForABadPrint) {
+  std::mt19937_64 rng = test_rng();
+  for (const bool is_square : {false, true}) {  // otherwise its pixels are 0.13 % uneven
+    for (const bool has_turns : {false, true}) {
+      const TrueRig truth = make_true_rig(
+          {.k1 = -0.05, .shift = 0.5, .square_pixels = is_square, .quarter_turns = has_turns, .seed = 5});
+      calib::Observations observations = observed_perfectly(truth, 4);
+      add_noise(0.015, 0.03, &rng, &observations);
+      EXPECT_EQ(calib::uneven_print(observations, {}, calib::solve(observations).value()).size, 0);
+    }
+  }
 }
 
 }  // namespace

@@ -94,6 +94,11 @@ TEST(Board, ReadsItsTextFormsAndWritesThemBack) {
   EXPECT_EQ(charuco->dictionary, "aruco_4x4_50");
   EXPECT_EQ(charuco->corner_count(), 70);
   EXPECT_EQ(charuco->text(), "charuco:11x8:25mm");
+  EXPECT_FALSE(charuco->is_exact);
+  for (const char* text : {"charuco:11x8:25mm:aruco_5x5_100:0.7:exact", "chessboard:9x7:75mm:exact"}) {
+    EXPECT_TRUE(Board::parse(text)->is_exact) << text;
+    EXPECT_EQ(Board::parse(text)->text(), text);
+  }
 
   const auto chessboard = Board::parse("chessboard:9x7:75mm");
   ASSERT_TRUE(chessboard.ok()) << chessboard.message();

@@ -171,7 +171,7 @@ TEST(Faults, KeystoneLeftOn) {
     return warped(image, {{{0.08F, 0}, {0.92F, 0}, {1, 1}, {0, 1}}});
   };
   // No projector has such an axis: poses contradict each other and the board seems bent.
-  expect_named(diagnosis_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "bent_board"});
+  expect_named(diagnosis_of(keystone, "keystone"), "keystone_or_scaling", {"odd_pose", "board_not_flat"});
 }
 
 TEST(Faults, DisplayNotInItsNativeResolution) {
@@ -367,7 +367,7 @@ TEST(Faults, OfOneKindAreOneEntryWithItsPoses) {
 TEST(Faults, BoardBent) {
   FaultBench bent = bench();
   bent.sheet = [](const Vector2d& p) { return Vector3d(p.x(), p.y(), 0.004 * (1 - p.x() * p.x() / 0.04)); };
-  expect_named(diagnosis_of(bent, "board bent by 4 mm"), "bent_board");
+  expect_named(diagnosis_of(bent, "board bent by 4 mm"), "board_not_flat");
 }
 
 TEST(Faults, BoardTwisted) {
@@ -375,7 +375,7 @@ TEST(Faults, BoardTwisted) {
   twisted.sheet = [](const Vector2d& p) {
     return Vector3d(p.x(), p.y(), 0.004 * p.x() * p.y() / 0.2 / 0.13);
   };
-  expect_named(diagnosis_of(twisted, "board twisted by 4 mm"), "bent_board", {"odd_pose"});
+  expect_named(diagnosis_of(twisted, "board twisted by 4 mm"), "board_not_flat", {"odd_pose"});
 }
 
 TEST(Faults, SquaresWiderThanHigh) {

@@ -8,6 +8,7 @@
 #include <optional>
 #include <random>
 
+#include "calib/surface/scan_size.h"
 #include "sim/car_door.h"
 #include "sim/truth.h"
 #include "sim/world.h"
@@ -139,6 +140,27 @@ TEST(Align, FindsTheDoorFromAnyPoseWithoutAStart) {
     ASSERT_TRUE(found.ok()) << found.message();
     EXPECT_TRUE(pose_near(found->registration.world_from_prototype,
                           turned_from_world * world.world_from_prototype, 0.05_deg, 0.3_mm));
+  }
+}
+
+// A calibration with a board of a wrong size makes scans that are too large or too small.
+TEST(Align, SaysHowLargeTheScanIs) {
+  auto rng = test_rng();
+  const sim::World world = bench_world();
+  const scene::Mesh& door = world.scene->prototype->mesh;
+  const scene::MeshBvh index(door);
+  const auto met = landings(world);
+  for (const double ratio : {1.0, 0.995, 1.01, 1.04}) {
+    scene::ScanSurface scan = scan_captures(world, met, 0, 1, rng);
+    for (auto& p : scan.positions) p *= static_cast<float>(ratio);
+    const auto pose =
+        refined_registration(door, index, scan, disturbed(world.world_from_prototype, 2_deg, 10_mm, rng));
+    ASSERT_TRUE(pose.ok()) << pose.message();
+    const auto size = scan_size(door, index, scan, *pose);
+    ASSERT_TRUE(size.ok()) << size.message();
+    EXPECT_NEAR(size->ratio, ratio, 3.5 * size->stddev + 1e-5);
+    EXPECT_LT(size->stddev, 5e-4);
+    EXPECT_EQ(contradicts(*size), ratio != 1.0);
   }
 }
 

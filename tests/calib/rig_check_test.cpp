@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <random>
 
+#include "calib/board_print.h"
 #include "calib/measurement_model.h"
 #include "calib/solve.h"
 #include "tests/support/matchers.h"
@@ -193,6 +194,39 @@ TEST(Recheck, NeverFlagsASoundRigInFiftySeeds) {
     EXPECT_EQ(checked->verdict, RigVerdict::sound) << seed;
     EXPECT_TRUE(checked->candidates.empty()) << seed;
   }
+}
+
+// A sheet that is 0.6 % wider than its text says, and twisted.
+TEST(Recheck, AnUnevenPrintThatTheRigKnowsIsNoMove) {
+  Rng rng = test_rng();
+  const Rig rig = true_rig(1, 1);
+  Observations seen = seen_by(rig, {}, &rng);
+  const Board& board = seen.board;
+  Eigen::VectorXd print = Eigen::VectorXd::Zero(k_print_modes);
+  print[0] = 0.003 * board.width_m();
+  const BoardShape shape{board.width_m(), board.height_m(), 0.002};
+  const Vector2d flat = Vector2d::Zero();
+  std::normal_distribution<double> scatter(0, k_corner_noise_px);
+  for (int pose = 0; pose < 3; ++pose) {
+    const Pose place = board_place(board, pose, &rng);
+    seen.poses.push_back("pose" + std::to_string(pose));
+    const ImagerView camera = view(rig.cameras[0]), projector = view(rig.projectors[0]);
+    for (int id = 0; id < board.corner_count(); ++id) {
+      Vector2d px, lit;
+      ASSERT_TRUE(predict_corner(camera, place, shape, flat, printed_corner(board, print, id), &px));
+      ASSERT_TRUE(predict_match(camera, projector, place, shape, flat, px, &lit));
+      seen.corners.push_back({0, pose, id, px + Vector2d(scatter(rng), scatter(rng)), k_corner_noise_px});
+      seen.matches.push_back(
+          {0, 0, pose, px, lit + Vector2d(scatter(rng), scatter(rng)), k_corner_noise_px, 100});
+    }
+  }
+  const auto known = check_rig(rig, seen, {.twist_m = 0.002, .print = print});
+  ASSERT_TRUE(known.ok()) << known.message();
+  EXPECT_EQ(known->verdict, RigVerdict::sound);
+  EXPECT_LT(known->devices[1].before_px, 0.15);
+  const auto unknown = check_rig(rig, seen);
+  ASSERT_TRUE(unknown.ok()) << unknown.message();
+  EXPECT_GT(unknown->devices[1].before_px, 2 * known->devices[1].before_px);
 }
 
 TEST(Recheck, NamesTheDeviceThatWasTurnedByAFifthOfADegreeAndPutsItBack) {

@@ -235,6 +235,7 @@ TrueRig make_true_rig(const RigOptions& options) {
   truth.bow_m = {options.bow_m, 0};
   truth.rig.cameras.push_back(
       imager("camera0", 1280, 960, {1500, 1502, 647, 472, -0.1, 0.05, 0.0005, -0.0003}, Pose()));
+  if (options.square_pixels) truth.rig.cameras[0].lens.values[1] = truth.rig.cameras[0].lens.values[0];
   const double cy = 299.5 + 600 * options.shift;
   const Vector3d p_eye(options.asunder, -0.15, 0.05), p_target(0, 0, k_away);
   const Pose towards = looking_at(p_eye, p_target, {0, -1, 0});
@@ -253,8 +254,10 @@ TrueRig make_true_rig(const RigOptions& options) {
     const Vector3d p(options.spread * (0.15 * column + 0.04 * even(rng)),
                      options.spread * (0.10 * row + 0.03 * even(rng)),
                      k_away + options.spread * 0.14 * even(rng));
-    truth.world_from_board.push_back(
-        Pose(exp_rotation({tilt * std::cos(around), tilt * std::sin(around), 0.3 * even(rng)}), p) * middle);
+    const Pose held(exp_rotation({tilt * std::cos(around), tilt * std::sin(around), 0.3 * even(rng)}), p);
+    const double turns = options.quarter_turns ? pose % 3 : 0;
+    const Pose rolled(exp_rotation({0, 0, turns * std::numbers::pi / 2}), Vector3d::Zero());
+    truth.world_from_board.push_back(held * rolled * middle);
   }
   // The prototype faces the bisector of camera and projector.
   truth.world_from_prototype = looking_at(p_target, 2 * p_target - p_eye / 2, Vector3d(0, -1, 0)).inverse();

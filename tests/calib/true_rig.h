@@ -28,10 +28,12 @@ struct RigOptions {
   double shift = 0;  ///< shift of the projector's lens, panel heights
   double bow_m = 0;  ///< bend of the board along its width
   int poses = 12;
-  double tilt = 0.55;    ///< largest tilt of the board, rad
-  double spread = 1;     ///< spread of the boards over the space; 0: all in the middle
-  double asunder = 0.5;  ///< m from camera to projector
-  unsigned seed = 1;     ///< seed of the poses
+  double tilt = 0.55;          ///< largest tilt of the board, rad
+  double spread = 1;           ///< spread of the boards over the space; 0: all in the middle
+  double asunder = 0.5;        ///< m from camera to projector
+  bool square_pixels = false;  ///< those of the camera; otherwise they are 0.13 % higher than wide
+  bool quarter_turns = false;  ///< every third board is held on its side, every third turned by 180 degrees
+  unsigned seed = 1;           ///< seed of the poses
 };
 /// Camera 1280 x 960, projector 800 x 600 with pixels of about 1 mm at the board, 1.3 m away.
 TrueRig make_true_rig(const RigOptions& options);

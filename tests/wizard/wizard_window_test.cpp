@@ -28,6 +28,8 @@ using Eigen::Vector2d;
 using State = WizardState;
 using std::chrono::milliseconds;
 
+const cv::Point2f k_use_button(1535, 760);
+
 WizardView a_view() {
   WizardView view;
   view.steps = {
@@ -68,10 +70,11 @@ WizardView a_view() {
 TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
   for (const cv::Size size : {cv::Size(1600, 1000), cv::Size(1024, 700)}) {
     test::GuiCanvas canvas(size);
+    BoardSizeInput board_size;
     WizardView view = a_view();
     view.cameras.pop_back();
     WizardWish wish = WizardWish::none;
-    for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { wish = draw_wizard(gui, view); });
+    for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { wish = draw_wizard(gui, view, &board_size); });
     EXPECT_EQ(wish, WizardWish::none);
     canvas.keep(fmt::format("wizard-{}", size.width));
     const auto count = [&](const cv::Scalar& low, const cv::Scalar& high) {
@@ -84,14 +87,40 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
     EXPECT_GT(count(green - slack, green + slack), 70 * 6) << "the corners";
     view.cameras[0].corners.clear();
     view.cameras[0].target.clear();
-    canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view); });
+    canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view, &board_size); });
     EXPECT_LT(count(amber - slack, amber + slack), 50);
     EXPECT_EQ(count(green - slack, green + slack), 0);
   }
   test::GuiCanvas canvas({1600, 1000});
+  BoardSizeInput board_size;
   const WizardView two = a_view();
-  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, two); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, two, &board_size); });
   canvas.keep("wizard-two");
+}
+
+// A wrong unit is named, right lengths are taken.
+TEST(WizardPanel, AsksHowLargeThePrintedBoardIs) {
+  test::GuiCanvas canvas({1600, 1000});
+  WizardView view = a_view();
+  view.board = calib::Board::parse("charuco:11x8:25mm").value();
+  view.asks_for_size = true;
+  BoardSizeInput board_size;
+  const auto draw = [&](gui::Gui& gui) { draw_wizard(gui, view, &board_size); };
+  for (int i = 0; i < 2; ++i) canvas.draw(draw);
+  canvas.keep("wizard-board-size");
+  const auto enter = [&](const std::string& text) {
+    std::copy_n(text.c_str(), text.size() + 1, board_size.text.begin());
+    canvas.click(k_use_button, draw);
+    canvas.draw(draw);
+  };
+  enter("22.52x14.99mm");
+  EXPECT_NE(board_size.problem.find("in cm"), std::string::npos) << board_size.problem;
+  canvas.keep("wizard-board-size-wrong");
+  enter("225.2x149.9mm:0.05");
+  EXPECT_EQ(board_size.problem, "");
+  EXPECT_EQ(board_size.taken, "225.2x149.9mm:0.05");
+  canvas.draw(draw);
+  canvas.keep("wizard-board-size-taken");
 }
 
 // The view at the end, with an error map.
@@ -119,28 +148,30 @@ WizardView an_end() {
 
 TEST(WizardPanel, EndsWithAVerdictAndWhereLightIsSure) {
   test::GuiCanvas canvas({1600, 1000});
+  BoardSizeInput board_size;
   const WizardView view = an_end();
-  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view, &board_size); });
   canvas.keep("wizard-end");
   bool is_closed = false;
-  const auto draw = [&](gui::Gui& gui) { is_closed |= draw_wizard(gui, view) == WizardWish::leave; };
+  const auto draw = [&](gui::Gui& gui) { is_closed |= draw_wizard(gui, view, &board_size) == WizardWish::leave; };
   canvas.click({360, 970}, draw);
   EXPECT_TRUE(is_closed);
 }
 
 TEST(WizardPanel, ScansThePrototypeWhenAsked) {
   test::GuiCanvas canvas({1600, 1000});
+  BoardSizeInput board_size;
   WizardView view = an_end();
   view.is_over = false;
   view.awaits_prototype = true;
   for (WizardStep step : {WizardStep::scan, WizardStep::align, WizardStep::paint})
     view.steps[static_cast<std::size_t>(step)] = {WizardState::waits};
   view.steps[static_cast<std::size_t>(WizardStep::scan)] = {WizardState::runs, "waiting for the prototype"};
-  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view); });
+  for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view, &board_size); });
   canvas.keep("wizard-prototype");
   std::vector<WizardWish> wishes;
   const auto draw = [&](gui::Gui& gui) {
-    const WizardWish wish = draw_wizard(gui, view);
+    const WizardWish wish = draw_wizard(gui, view, &board_size);
     if (wish != WizardWish::none) wishes.push_back(wish);
   };
   canvas.click({360, 970}, draw);

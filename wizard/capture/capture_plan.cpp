@@ -1,5 +1,6 @@
 #include "wizard/capture/capture_plan.h"
 
+#include "calib/capture_set.h"
 #include "calib/code/patterns.h"
 #include "core/config.h"
 #include "core/photometric_response.h"
@@ -30,13 +31,15 @@ std::filesystem::path read_code(const Config& config, Plan* plan) {
 Result<Plan> load_plan(const std::filesystem::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.plan/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "world", "board", "code", "code_options", "response", "world_from_board"});
+  root.only({"schema", "world", "board", "code", "code_options", "response", "world_from_board",
+             "board_measured_mm", "board_measured_stddev_mm"});
   Plan plan;
   plan.world = config.folder() / root.at("world").text();
   const ConfigNode board = root.at("board");
   auto parsed = calib::Board::parse(board.text());
   if (parsed) plan.board = *parsed;
   if (!parsed) board.problem(parsed.message());
+  plan.board_measured = calib::read_board_measured(root);
   const std::filesystem::path response_json = read_code(config, &plan);
   if (const auto response = root.find("response")) plan.response = response->boolean();
   const ConfigNode poses = root.at("world_from_board");

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/board/board.h"
+#include "calib/board_print.h"
 #include "calib/code/patterns.h"
 #include "core/photometric_response.h"
 #include "core/pose.h"
@@ -20,6 +22,8 @@ struct Plan {
   calib::CodeOptions code_options;
   /// Measured responses for the code phase; empty: waves are drawn with code_options.gamma.
   std::vector<ProjectorResponse> responses;
+  /// The size of the print, measured by hand: "board_measured_mm", "board_measured_stddev_mm".
+  std::optional<calib::BoardMeasured> board_measured = {};
   std::vector<Pose> world_from_board;  ///< board frame as in calib/board/board.h
   bool response = false;               ///< also capture the response images, of the prototype
 };

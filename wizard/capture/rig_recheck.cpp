@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "calib/board_print.h"
 #include "calib/observations.h"
 #include "core/config.h"
 #include "core/file.h"
@@ -33,17 +34,33 @@ Json provenance_of(const Rig& rig) {
   return provenance.is_object() ? provenance : Json::object();
 }
 
-// The rig's own error and the bend of its board, as its solve stored them.
+// Adds the bend, the twist and the print of the board as its solve stored them.
+void add_board(const Json& provenance, calib::RigCheckOptions* options) {
+  const auto numbers_in_mm = [&](const char* key, std::size_t count) {
+    std::vector<double> metres;
+    const auto list = provenance.find(key);
+    if (list == provenance.end() || !list->is_array() || list->size() != count) return metres;
+    for (const Json& number : *list)
+      if (number.is_number()) metres.push_back(1e-3 * number.get<double>());
+    if (metres.size() != count) metres.clear();
+    return metres;
+  };
+  if (const auto bend = numbers_in_mm("board_bend_mm", 2); !bend.empty())
+    options->bend_m = {bend[0], bend[1]};
+  const auto print = numbers_in_mm("board_print_mm", calib::k_print_modes);
+  options->print = Eigen::Map<const Eigen::VectorXd>(print.data(), static_cast<Eigen::Index>(print.size()));
+  if (const auto twist = provenance.find("board_twist_mm"); twist != provenance.end() && twist->is_number())
+    options->twist_m = 1e-3 * twist->get<double>();
+}
+
+// The rig's own error and the shape of its board, as its solve stored them.
 calib::RigCheckOptions options_for(const Rig& rig, const calib::Board& board) {
   calib::RigCheckOptions options;
   const Json provenance = provenance_of(rig);
   if (const auto held_out = provenance.find("held_out_px");
       held_out != provenance.end() && held_out->is_number())
     options.rig_px = std::max(k_least_rig_px, held_out->get<double>() / std::sqrt(2.0));
-  const auto bend = provenance.find("board_bend_mm");
-  if (bend != provenance.end() && provenance.value("board", Json()) == board.text() && bend->is_array() &&
-      bend->size() == 2 && bend->at(0).is_number() && bend->at(1).is_number())
-    options.bend_m = 1e-3 * Eigen::Vector2d(bend->at(0).get<double>(), bend->at(1).get<double>());
+  if (provenance.value("board", Json()) == board.text()) add_board(provenance, &options);
   return options;
 }
 

@@ -44,6 +44,7 @@ Result<calib::CaptureSet> plan_virtual_captures(const Plan& plan,
   calib::CaptureSet captures =
       calib::plan_captures(out, devices(rig.world().rig.cameras), devices(rig.world().rig.projectors),
                            plan.board, plan.code, plan.code_options);
+  captures.board_measured = plan.board_measured;
   if (plan.responses.empty()) return captures;
   for (std::size_t i = 0; i < captures.patterns.size(); ++i) {
     LIMN_TRY(captures.patterns[i],

@@ -203,10 +203,20 @@ Result<MeshAligned> align(const AlignOptions& command,
 
 std::string text_of(const calib::Difference& d) {
   return fmt::format(
-      "{:.1f} cm2 backend ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan lies {:.1f} mm {} the CAD "
+      "{:.1f} cm2 at ({:.0f}, {:.0f}, {:.0f}) mm of the prototype: the scan lies {:.1f} mm {} the CAD "
       "(up to {:.1f} mm)",
       1e4 * d.area_m2, 1e3 * d.p_prototype.x(), 1e3 * d.p_prototype.y(), 1e3 * d.p_prototype.z(),
       1e3 * std::abs(d.mean_m), d.mean_m > 0 ? "outside" : "inside", 1e3 * std::abs(d.worst_m));
+}
+
+std::string text_of(const calib::ScanSize& size) {
+  return fmt::format(
+      "the scan is {:.4f} times as large as the CAD (standard deviation {:.4f}): the calibration's board may "
+      "have "
+      "another size than its text says, or the model was built larger or smaller. Measure a length on the "
+      "model, "
+      "and the board (limn solve --board-measured).",
+      size.ratio, size.stddev);
 }
 
 nlohmann::ordered_json json_of(const MeshAligned& aligned,
@@ -225,6 +235,8 @@ nlohmann::ordered_json json_of(const MeshAligned& aligned,
   }
   json["rms_mm"] = 1e3 * a.rms_m;
   json["points"] = {{"near", a.near}, {"used", a.used}, {"scan", aligned.overlap.scan_points}};
+  json["size_ratio"] = aligned.size.ratio;
+  json["size_ratio_stddev"] = aligned.size.stddev;
   json["near_mm"] = 1e3 * aligned.overlap.near_m;
   json["scan_share_near"] = aligned.overlap.scan_share;
   json["cad_share_near"] = aligned.overlap.mesh_share;
@@ -312,6 +324,8 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
     return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
   const scene::MeshBvh index(mesh);
   LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
+  if (const auto size = calib::scan_size(mesh, index, scan, aligned.registration)) aligned.size = *size;
+  if (calib::contradicts(aligned.size)) aligned.warnings.push_back(text_of(aligned.size));
   aligned.overlap = calib::overlap(mesh, index, scan, aligned.registration.world_from_prototype);
   const auto residuals = calib::residuals(index, scan, aligned.registration, k_residual_reach_m);
   const auto differences =

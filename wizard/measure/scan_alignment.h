@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/surface/registration.h"
+#include "calib/surface/scan_size.h"
 #include "core/result.h"
 #include "scene/mesh.h"
 
@@ -31,6 +32,7 @@ struct AlignOptions {
 struct MeshAligned {
   calib::Registration registration;
   calib::Overlap overlap;             ///< scan and mesh; zeros without a scan
+  calib::ScanSize size = {};          ///< the scan's; a deviation of 0 where it could not be compared
   std::string how;                    ///< where the start came from
   std::vector<std::string> warnings;  ///< symmetry, undetermined directions, differences of CAD and scan
 };

@@ -51,7 +51,8 @@ Result<calib::Report> solve_cameras(const SolveCommandOptions& options) {
                        std::move(assessment),
                        {{"board", board_seconds}, {"solve", solve_seconds}, {"total", seconds_after(begun)}},
                        std::move(choice.trials)};
-  report.explanation = calib::explain(report.observed, report.solution, report.assessment);
+  report.explanation = calib::explain(report.observed, report.solution, report.assessment,
+                                      views.cameras.size() == 1 || views.board.is_exact);
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(calib::write_rig_folder(report, choice.options, options.out));

@@ -54,30 +54,19 @@ Status check_models(const SolveCommandOptions& options) {
   return {};
 }
 
-// The print's measured size; none where nobody measured it.
-Result<std::optional<calib::BoardMeasured>> measured_board(const calib::CaptureSet& captures,
-                                                           const std::string& text) {
-  std::optional<calib::BoardMeasured> measured = captures.board_measured;
-  if (!text.empty()) {
-    const auto parsed = calib::parse_board_measured(text);
-    if (!parsed) return usage_error("{}", parsed.message());
-    measured = *parsed;
-  }
-  if (measured) LIMN_TRY_STATUS(calib::check_measured(captures.board, *measured));
-  return measured;
-}
-
 // Solves again with the print's errors as unknowns where the observations show that it is uneven.
 Status solve_uneven_print(const calib::Observations& observations,
                           const SolveCommandOptions& options,
                           calib::SolveOptions* solving,
                           calib::ModelSelection* choice) {
   if (options.pixels_not_square) return {};
-  solving->print_size = calib::uneven_print(observations, *solving, choice->solution);
-  if (solving->print_size == 0) return {};
-  solving->square_pixels = true;
-  LIMN_TRY(choice->solution, calib::solve_from(observations, *solving, choice->solution));
-  LIMN_TRY(choice->held_out, calib::cross_validate(observations, *solving, choice->solution));
+  const calib::UnevenPrint print = calib::uneven_print(observations, *solving, choice->solution);
+  if (print.size == 0) return {};
+  solving->print_size = print.size;
+  solving->square_pixels = print.are_pixels_square;
+  solving->lens_models.clear();  // other lenses may be chosen, now that they need not imitate the print
+  LIMN_TRY(*choice, calib::solve_selecting_models(observations, *solving));
+  *solving = choice->options;
   return {};
 }
 
@@ -95,6 +84,13 @@ Status check_lengths(const calib::CaptureSet& captures,
       calib::add_faults({*fault}, &report->assessment);
   }
   return {};
+}
+
+// Whether the side of a marker, or the distance of two, was measured.
+bool is_any_seen(const std::vector<calib::ScaleBarCheck>& checks, bool is_side) {
+  return std::any_of(checks.begin(), checks.end(), [&](const calib::ScaleBarCheck& check) {
+    return !check.views.empty() && check.known.is_side() == is_side;
+  });
 }
 
 // The error of a failed solve with the faults that explain it, which are also written to report.json.
@@ -128,6 +124,18 @@ Status measure_vignetting(const calib::CaptureSet& captures,
 }
 
 }  // namespace
+
+Result<std::optional<calib::BoardMeasured>> measured_board(const calib::CaptureSet& captures,
+                                                           const std::string& text) {
+  std::optional<calib::BoardMeasured> measured = captures.board_measured;
+  if (!text.empty()) {
+    const auto parsed = calib::parse_board_measured(text);
+    if (!parsed) return usage_error("{}", parsed.message());
+    measured = *parsed;
+  }
+  if (measured) LIMN_TRY_STATUS(calib::check_measured(captures.board, *measured));
+  return measured;
+}
 
 Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   const auto begun = Clock::now();
@@ -173,9 +181,11 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
                        std::move(choice->trials)};
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
   LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
-  report.explanation = calib::explain(report.observed, report.solution, report.assessment);
-  if (!lengths.empty()) report.scale_rests_on = "known_length";
+  if (is_any_seen(report.scale_bar_lengths, true)) report.scale_rests_on = "markers";
+  if (is_any_seen(report.scale_bar_lengths, false)) report.scale_rests_on = "known_length";
   if (measured) report.scale_rests_on = "board_measured";
+  const bool is_scale_checked = captures.board.is_exact || report.scale_rests_on != "board";
+  report.explanation = calib::explain(report.observed, report.solution, report.assessment, is_scale_checked);
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(write_together(options.out, [&](const std::filesystem::path& into) -> Status {

@@ -29,6 +29,11 @@ struct SolveCommandOptions {
   bool pixels_not_square = false;
 };
 
+/// The print's measured size: that of the text (calib/board_print.h), else that of the captures, else none.
+/// Errors: lengths that are not this board's, lengths of a board whose text says that it is exact.
+Result<std::optional<calib::BoardMeasured>> measured_board(const calib::CaptureSet& captures,
+                                                           const std::string& text);
+
 /// Solves captures and writes the rig folder (rig.json, .cameramodel files, report.json, report.html,
 /// observations.json). If the solve fails, at most report.json is written, with the faults that explain it.
 Result<calib::Report> solve_captures(const SolveCommandOptions& options);

@@ -377,7 +377,7 @@ WizardWish draw_buttons(const gui::Gui& gui, const WizardView& view) {
 
 }  // namespace
 
-WizardWish draw_wizard(gui::Gui& gui, const WizardView& view) {
+WizardWish draw_wizard(gui::Gui& gui, const WizardView& view, BoardSizeInput* size) {
   const ImVec2 room = ImGui::GetContentRegionAvail();
   const float space = ImGui::GetStyle().ItemSpacing.x;
   const float left = std::clamp(0.17F * room.x, 11 * gui.em(), 15 * gui.em()),
@@ -411,6 +411,10 @@ WizardWish draw_wizard(gui::Gui& gui, const WizardView& view) {
   gap(gui);
   if (view.judged.empty()) draw_light(gui, view);
   draw_faults(gui, view);
+  if (view.asks_for_size && !view.has_rig && !view.is_over) {
+    gap(gui);
+    draw_board_size(gui, view.board, size);
+  }
   ImGui::EndChild();
   return wish;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/board/board.h"
 #include "calib/judge/assess.h"
 #include "calib/observations.h"
 #include "wizard/capture/exposure_check.h"
@@ -49,6 +50,8 @@ struct WizardView {
     std::string pose;
     std::optional<double> held_out_px, predicted_mm;  ///< none: no rig yet
   };
+  calib::Board board = {};
+  bool asks_for_size = false;  ///< whether nobody has measured the board yet, whose text may be wrong
   std::array<Step, k_wizard_steps> steps;  ///< in the order of WizardStep
   std::vector<ExposureReading> light;      ///< results of the exposure step
   std::vector<Camera> cameras;

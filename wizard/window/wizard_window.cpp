@@ -22,6 +22,8 @@ class Progress {
   Progress(const WizardPlan& plan, std::atomic<WizardWish>* wish)
       : plan_(plan), targets_(plan.targets), wish_(wish) {
     step(WizardStep::devices) = {State::done, plan.devices};
+    view_.board = plan.captures.board;
+    view_.asks_for_size = !plan.captures.board_measured && !plan.captures.board.is_exact;
     for (const calib::CapturedDevice& camera : plan.captures.cameras)
       view_.cameras.push_back({.name = camera.name, .width = camera.width, .height = camera.height});
     for (const calib::CapturedDevice& projector : plan.captures.projectors)
@@ -64,7 +66,17 @@ class Progress {
                        const std::vector<calib::Fault>& faults) {
                   add_judged_pose(judged, observations, faults);
                 },
+            .board_measured =
+                [this] {
+                  const std::lock_guard lock(mutex_);
+                  return board_measured_;
+                },
             .wish = wish_};
+  }
+
+  void take_board_size(const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    board_measured_ = text;
   }
 
   // The rig has been solved.
@@ -212,6 +224,7 @@ class Progress {
   std::vector<std::vector<std::vector<Eigen::Vector2d>>> targets_;  // those known so far
   mutable std::mutex mutex_;
   WizardView view_;
+  std::string board_measured_;
   std::atomic<WizardWish>* wish_;
 };
 
@@ -235,6 +248,7 @@ Result<Calibrated> calibrate_in_window(gui::GuiWindow* window,
       throw;
     }
   });
+  BoardSizeInput size;
   for (bool is_closed = false; !is_closed;) {
     executor->serve();
     window->pressed_keys();
@@ -244,7 +258,8 @@ Result<Calibrated> calibrate_in_window(gui::GuiWindow* window,
     }
     const WizardView view = progress.view();
     WizardWish asked = WizardWish::none;
-    window->draw([&](gui::Gui& gui) { asked = draw_wizard(gui, view); });
+    window->draw([&](gui::Gui& gui) { asked = draw_wizard(gui, view, &size); });
+    progress.take_board_size(size.taken);
     if (!window->is_wanted()) asked = WizardWish::leave;
     is_closed = asked == WizardWish::leave && (view.is_over || !window->is_wanted());
     if (asked != WizardWish::none && !view.is_over) progress.wish(asked);

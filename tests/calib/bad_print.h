@@ -1,0 +1,38 @@
+#pragma once
+
+// The errors of an office printer, for tests and benches.
+
+#include <Eigen/Core>
+#include <cmath>
+#include <numbers>
+
+#include "calib/board/board.h"
+
+namespace limn::test {
+
+// A print that is 0.15 % wider than it is high, with smooth errors of 0.1 mm (waves, which no polynomial of
+// the solve is), on a board that is bowed and twisted.
+struct BadPrint {
+  double aspect = 0.0015, smooth_m = 0.1e-3;
+  double phase = 0.7;
+
+  Eigen::Vector2d at(const calib::Board& board, const Eigen::Vector2d& p) const {
+    const double x = p.x() / board.width_m(), y = p.y() / board.height_m(), tau = 2 * std::numbers::pi;
+    return {p.x() * (1 + aspect) + smooth_m * std::sin(tau * (0.7 * x + 0.5 * y) + phase),
+            p.y() + smooth_m * std::cos(tau * (0.4 * x - 0.7 * y) + 2 * phase)};
+  }
+  // From the first to the last inner corner, as means over rows and columns.
+  Eigen::Vector2d lengths(const calib::Board& board) const {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    const int columns = board.columns - 1, rows = board.rows - 1;
+    const auto corner = [&](int column, int row) {
+      return at(board, board.p_corner(row * columns + column).head<2>());
+    };
+    for (int row = 0; row < rows; ++row) sum.x() += (corner(columns - 1, row) - corner(0, row)).x() / rows;
+    for (int column = 0; column < columns; ++column)
+      sum.y() += (corner(column, rows - 1) - corner(column, 0)).y() / columns;
+    return sum;
+  }
+};
+
+}  // namespace limn::test
