@@ -14,20 +14,43 @@ bool may_hold_surface_part(vec3 p, int placement_count) {
   return may_hold;
 }
 
+// Steps along the normal, to each side, so that the line from -k_on_surface to k_on_surface moves by at most a
+// pixel of the id image at each: none where it is seen from its end, several where it is seen from the side.
+int steps_along_normal(Viewpoint viewpoint, vec3 p, vec3 d_normal) {
+  const float k_most_steps = 8.0;
+  vec3 d = mat3(viewpoint.pinhole_from_scene) * (p - viewpoint.p_origin.xyz);
+  vec3 n = k_on_surface * (mat3(viewpoint.pinhole_from_scene) * d_normal);
+  vec2 px = viewpoint.focal_centre.xy * (n.xy - n.z * d.xy / d.z) / d.z;
+  return int(clamp(ceil(length(px) - 0.25), 0.0, k_most_steps));
+}
+
+// Whether a part covers the point p of the plane of a triangle that is thinner than a texel, as first_hit has
+// it.
+bool is_covered_by_thin(usampler2DArray s_ids, Viewpoint viewpoint, Hit missed, vec3 p) {
+  vec3 d = p - viewpoint.p_origin.xyz;
+  float t = length(d);
+  vec4 share;
+  uvec4 ids = ids_around(s_ids, viewpoint, 1, d, share);
+  return dot(share, vec4(notEqual(ids, uvec4(0)))) >= 0.5 &&
+         is_thin(missed.id, t, turned_to_owner(owner_of(missed.id), d / t), viewpoint);
+}
+
 // The surface part at the prototype's point p with unit normal d_normal: the nearest intersection of the
 // normal line with a triangle within 2 mm. Only triangles in the projector's id image around the line are
-// tested. In the middle of a part, where many triangles meet in a corner, rounding may miss all of them; then
-// the one missed by least is used.
+// tested. In the middle of a part, where many triangles meet in a corner, rounding may miss all of them, and
+// triangles thinner than a texel may be in no texel; then the one missed by least is used.
 Hit surface_part_at(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p, vec3 d_normal) {
-  const float k_heights[5] = float[](0.0, 0.5, -0.5, 1.0, -1.0);
+  int steps = steps_along_normal(viewpoint, p, d_normal);
   Hit best = k_no_hit, missed = k_no_hit;
-  float missed_by = 0.5;  // as a fraction of a triangle's height
+  float missed_by = 2.0;  // as a fraction of a triangle's height
   bool in_middle = false, is_through = false;  // hit a piece below the alpha cutoff
   uvec4 tried = uvec4(0);
   int height = 0;
   do {
     vec4 share;
-    vec3 d = p + k_heights[height] * k_on_surface * d_normal - viewpoint.p_origin.xyz;
+    // Heights 0, 1, -1, 2, -2 and so on, in steps.
+    float along = float((height + 1) / 2) * (height % 2 == 1 ? 1.0 : -1.0) / float(max(steps, 1));
+    vec3 d = p + along * k_on_surface * d_normal - viewpoint.p_origin.xyz;
     uvec4 ids = ids_around(s_ids, viewpoint, 1, d, share);
     if (height == 0) in_middle = all(notEqual(ids, uvec4(0)));
     for (int k = 0; k < 4; ++k)
@@ -52,7 +75,9 @@ Hit surface_part_at(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p, vec3 d_n
         best = hit;
       }
     } while (left.x != 0u);
-  } while (best.id == 0u && ++height < 5);
-  if (best.id == 0u && in_middle && !is_through) best = missed;
+  } while (best.id == 0u && ++height <= 2 * steps);
+  if (best.id == 0u && missed.id != 0u && !is_through &&
+      (in_middle && missed_by < 0.5 || is_covered_by_thin(s_ids, viewpoint, missed, p + missed.t * d_normal)))
+    best = missed;
   return best;
 }
