@@ -3,8 +3,10 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
+#include "calib/judge/glued_sheets.h"
 #include "core/log.h"
 
 namespace limn::calib {
@@ -101,6 +103,31 @@ void note_print(const Board& board, const Solution& solution, std::vector<Fault>
        solution.print_is_measured ? Severity::note : Severity::doubt});
 }
 
+// Where each corner lies, as displacement from the board's text; NaN where too few poses show it.
+std::vector<Vector2d> displacements(const Observations& observations,
+                                    const Solution& solution,
+                                    const BoardOffsets& offsets) {
+  std::vector<Vector2d> all;
+  for (int id = 0; id < observations.board.corner_count(); ++id) {
+    const Vector3d& offset = offsets.offsets[static_cast<size_t>(id)];
+    all.emplace_back(Vector2d::Constant(std::numeric_limits<double>::quiet_NaN()));
+    if (offset.isZero()) continue;
+    all.back() = printed_corner(observations.board, solution.print, id) -
+                 observations.board.p_corner(id).head<2>() + offset.head<2>();
+  }
+  return all;
+}
+
+Fault glued(const SheetStep& step) {
+  return {
+      FaultName::uneven_print,
+      fmt::format("the board seems to be glued from two sheets: from about its {} {} of inner corners on, all are "
+                  "displaced by {:.2f} mm across and {:.2f} mm down",
+                  step.is_between_columns ? "column" : "row", step.line + 1, 1e3 * step.offset_m.x(),
+                  1e3 * step.offset_m.y()),
+      "print the board on one sheet, or glue the sheets again, edge to edge", Severity::doubt};
+}
+
 }  // namespace
 
 BoardOffsets board_offsets(const Observations& observations, const Solution& solution) {
@@ -139,7 +166,10 @@ std::vector<Fault> board_faults(const Observations& observations, const Solution
              1e3 * bend, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(), 1e3 * solution.twist_m,
              1e3 * offsets.out_m),
          "glue the board onto glass, aluminium or honeycomb and hold it without pressing it"});
-  if (solution.print.size() > 0) note_print(observations.board, solution, &faults);
+  if (const auto step = find_sheet_step(observations.board, displacements(observations, solution, offsets)))
+    faults.push_back(glued(*step));
+  else if (solution.print.size() > 0)
+    note_print(observations.board, solution, &faults);
   const double stretch = common_stretch(solution.rig);
   const bool is_stretched = std::abs(stretch) > 0.01;
   if (is_stretched || (faults.empty() && offsets.across_m > allowed))

@@ -15,10 +15,12 @@ namespace limn::test {
 struct BadPrint {
   double aspect = 0.0015, smooth_m = 0.1e-3;
   double phase = 0.7;
+  double step_m = 0;  // displacement of the right half, to the right
 
   Eigen::Vector2d at(const calib::Board& board, const Eigen::Vector2d& p) const {
     const double x = p.x() / board.width_m(), y = p.y() / board.height_m(), tau = 2 * std::numbers::pi;
-    return {p.x() * (1 + aspect) + smooth_m * std::sin(tau * (0.7 * x + 0.5 * y) + phase),
+    return {p.x() * (1 + aspect) + (x > 0.5 ? step_m : 0) +
+                smooth_m * std::sin(tau * (0.7 * x + 0.5 * y) + phase),
             p.y() + smooth_m * std::cos(tau * (0.4 * x - 0.7 * y) + 2 * phase)};
   }
   // From the first to the last inner corner, as means over rows and columns.

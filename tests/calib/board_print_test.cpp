@@ -168,6 +168,21 @@ TEST(BoardPrint, AnUnevenPrintShowsWithoutLengthsAndUnevenPixelsAreNotTakenForOn
   }
 }
 
+TEST(BoardPrint, ABoardGluedFromTwoSheetsIsNamed) {
+  std::mt19937_64 rng = test_rng();
+  for (const double step_m : {0.0, 0.4e-3, 1e-3}) {
+    const Printed made = printed({.aspect = 0, .smooth_m = 0.05e-3, .step_m = step_m}, 3, &rng);
+    const calib::Solution plain = calib::solve(made.observations).value();
+    const calib::UnevenPrint uneven = calib::uneven_print(made.observations, {}, plain);
+    const Judged judgement = judged(made, {.print_size = uneven.size}, &rng);
+    const auto& faults = judgement.assessment.faults;
+    const auto named = std::find_if(faults.begin(), faults.end(), [](const calib::Fault& f) {
+      return f.evidence.find("two sheets: from about its column ") != std::string::npos;
+    });
+    EXPECT_EQ(named != faults.end(), step_m > 0) << step_m << ": " << calib::to_text(faults);
+  }
+}
+
 TEST(BoardPrint, AnExactBoardIsNotTakenForABadPrint) {
   std::mt19937_64 rng = test_rng();
   for (const bool is_square : {false, true}) {  // otherwise its pixels are 0.13 % uneven
