@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/code/patterns.h"
+#include "calib/code/shake.h"
 
 namespace limn::calib {
 
@@ -57,6 +58,9 @@ struct CaptureQuality {
   int shift_patches = 0;  ///< number of patches with texture; 0: motion is not measured
   /// Share of the illuminated pixels whose finest bit is unsure, on the worse axis: a measure of defocus.
   double unsure_finest = 0;
+  /// What decoding has taken out because camera, board or light was not still. The labels belong to the mean
+  /// of the series' images: a point that white shows at p is there at p - shake.white_shift_px.
+  Shake shake;
   IntensityNoise noise;  ///< from the scatter of the pairs' sums; this default when there are too few samples
 };
 

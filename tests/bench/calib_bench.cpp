@@ -34,6 +34,7 @@ using Eigen::Vector3d;
 struct Case {
   std::string name;
   RigOptions options;
+  double shake_px = 0, flicker = 0;
 };
 
 std::vector<Case> all_cases() {
@@ -45,6 +46,7 @@ std::vector<Case> all_cases() {
     cases.push_back({"wide" + suffix, {.k1 = -0.15, .shift = 1.1, .bow_m = bow, .seed = 3}});
   }
   cases.push_back({"ill-posed", {.k1 = -0.05, .shift = 0.5, .tilt = 0.05, .spread = 0.15, .seed = 4}});
+  cases.push_back({"shaken", {.k1 = -0.05, .shift = 0.5, .seed = 2}, 0.2, 0.015});
   return cases;
 }
 
@@ -82,20 +84,25 @@ sim::Object bowed_board(const TrueRig& truth, const Pose& world_from_board) {
   return object;
 }
 
-sim::World world_of(const TrueRig& truth) {
+sim::World world_of(const Case& test_case, const TrueRig& truth) {
   sim::World world;
   world.rig = truth.rig;
-  world.camera_effects = {{.exposure = 0.9, .psf_px = 0.6, .read_noise = 2, .black_level = 4}};
+  world.camera_effects = {{.exposure = 0.9,
+                           .psf_px = 0.6,
+                           .read_noise = 2,
+                           .black_level = 4,
+                           .shake_px = test_case.shake_px,
+                           .flicker = test_case.flicker}};
   world.projector_effects = {
       {.illuminance_at_1m = 1.7, .gamma = 2.2, .black_level = 0.002, .focus_m = 1.3, .aperture_m = 0.01}};
   world.room.ambient = 0.05;
   return world;
 }
 
-Result<calib::CaptureSet> captured(const TrueRig& truth, const fs::path& folder) {
+Result<calib::CaptureSet> captured(const Case& test_case, const TrueRig& truth, const fs::path& folder) {
   if (fs::exists(folder / "complete")) return calib::load_captures(folder);
   fs::remove_all(folder);
-  sim::World world = world_of(truth);
+  sim::World world = world_of(test_case, truth);
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
   const calib::CaptureSet plan =
       calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
@@ -335,7 +342,7 @@ Status run_case(const Case& test_case, const fs::path& folder) {
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   };
-  LIMN_TRY(const calib::CaptureSet captures, captured(truth, folder / test_case.name));
+  LIMN_TRY(const calib::CaptureSet captures, captured(test_case, truth, folder / test_case.name));
   fmt::print("{}: captured {:.0f} s\n", test_case.name, seconds());
   const double begun_solving = seconds();
   LIMN_TRY(const calib::Observed observed, calib::observe(captures));
@@ -344,9 +351,9 @@ Status run_case(const Case& test_case, const fs::path& folder) {
   LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, options, solution));
   fmt::print(
       "  Limn: {} corners {:.3f} px, {} matches {:.3f} px; bend {:.3f} {:.3f} mm; held-out {:.3f} px; {}\n",
-      observed.observations.corners.size(), solution.noise.corner.common_px, observed.observations.matches.size(),
-      solution.noise.match.common_px, 1e3 * solution.bend_m.x(), 1e3 * solution.bend_m.y(),
-      assessment.held_out.rms_px, calib::to_text(assessment.verdict));
+      observed.observations.corners.size(), solution.noise.corner.common_px,
+      observed.observations.matches.size(), solution.noise.match.common_px, 1e3 * solution.bend_m.x(),
+      1e3 * solution.bend_m.y(), assessment.held_out.rms_px, calib::to_text(assessment.verdict));
   for (const calib::Fault& fault : assessment.faults)
     fmt::print("  {}: {}\n", calib::to_text(fault.name), fault.evidence);
   const double limn_seconds = seconds() - begun_solving;
