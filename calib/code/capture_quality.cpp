@@ -33,9 +33,9 @@ constexpr double k_off_noise = 4.5;  // times a sum's noise, the second limit
 // Mean difference of two images of one pattern, as a share of the contrast.
 constexpr double k_same = 0.08;
 constexpr double k_odd_group = 0.05;   // share of samples that are off; motion at edges stays below
-constexpr double k_odd_times = 4;      // the median of all groups, the second limit
-constexpr double k_odd_most = 0.2;     // blurred stripes of a camera that is not linear are off everywhere
 constexpr double k_wrong_group = 0.5;  // the same; motion never causes that much
+// The same where images are displaced by some tenths of a pixel.
+constexpr double k_odd_shaken = 0.3, k_wrong_shaken = 0.8;
 // Contrast of an image's stripes: below the first, images of different patterns are as alike as k_same says;
 // above the second, a camera that is not linear leaves sums right to k_off.
 constexpr double k_resolved = 0.25, k_clear = 0.75;
@@ -223,10 +223,9 @@ void find_odd(const Samples& lit,
               const std::vector<PatternGroup>& groups,
               const std::vector<std::filesystem::path>& files,
               CaptureQuality* quality) {
-  // Where camera or board vibrates, edges are off in all pairs.
-  std::vector<double> off;
-  for (const GroupQuality& group : quality->groups) off.push_back(group.off);
-  const double limit = std::clamp(k_odd_times * median(std::move(off)), k_odd_group, k_odd_most);
+  // Where camera or board vibrates, the edges of ink and of fine stripes are off.
+  const bool shakes = quality->shake.shakes;
+  const double limit = shakes ? k_odd_shaken : k_odd_group, wrong = shakes ? k_wrong_shaken : k_wrong_group;
   for (const GroupQuality& group : quality->groups) {
     if (group.count != 2) continue;
     if (group.off < limit) continue;
@@ -238,7 +237,7 @@ void find_odd(const Samples& lit,
                           !second.is_between() || errs_both_ways(lit, group.first);
     if (auto odd = finding(lit, groups, files, group.first)) {
       quality->odd.push_back(std::move(*odd));
-    } else if (group.off > k_wrong_group && is_clear) {
+    } else if (group.off > wrong && is_clear) {
       const auto name = files[static_cast<size_t>(group.first) + 1].filename().string();
       quality->odd.push_back({files[static_cast<size_t>(group.first)],
                               "and " + name + " do not add up to what the other pairs do"});
@@ -417,8 +416,10 @@ void CaptureQualityProbe::add_image(int index, const cv::Mat& image) {
   cv::add(*sum, reduced, *sum, cv::noArray(), CV_32F);
 }
 
-CaptureQuality CaptureQualityProbe::quality(const std::vector<std::filesystem::path>& files) const {
+CaptureQuality CaptureQualityProbe::quality(const std::vector<std::filesystem::path>& files,
+                                            const Shake& shake) const {
   CaptureQuality quality;
+  quality.shake = shake;
   const std::vector<PatternGroup> groups = patterns_.groups();
   const Samples lit = lit_samples(groups, samples_);
   quality.samples = static_cast<int>(lit.size());

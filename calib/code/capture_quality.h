@@ -71,8 +71,9 @@ class CaptureQualityProbe {
   CaptureQualityProbe(const Patterns& patterns, int width, int height);
   /// Adds image number `index`, 8-bit grey; every index once, in any order.
   void add_image(int index, const cv::Mat& image);
-  /// Call it after all images. `files`: the images' names.
-  CaptureQuality quality(const std::vector<std::filesystem::path>& files) const;
+  /// Call it after all images. `files`: the images' names. `shake`: what their pairs show; its edges are no
+  /// sign of a wrong image.
+  CaptureQuality quality(const std::vector<std::filesystem::path>& files, const Shake& shake = {}) const;
 
  private:
   Patterns patterns_;

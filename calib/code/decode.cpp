@@ -458,15 +458,14 @@ constexpr double k_most_share_stddev = 0.2;
 
 // Says in the readings what a shake has done to their pairs: the displacement as far as the stripes follow
 // it.
-Shake settle_shake(const std::vector<AxisLabels>& labels, std::array<AxisReading, 2>* axes) {
-  Shake shake = shake_of({(*axes)[0].shake, (*axes)[1].shake});
+void settle_shake(const std::vector<AxisLabels>& labels, Shake* shake, std::array<AxisReading, 2>* axes) {
   StripeShare sum;
   for (size_t i = 0; i < 2; ++i) {
     AxisReading& axis = (*axes)[i];
     axis.shake.clear();
-    if (!shake.shakes && !shake.flickers) continue;
-    axis.shake = shake.axes[i];
-    if (!shake.shakes || axis.bits() == 0) continue;
+    if (!shake->shakes && !shake->flickers) continue;
+    axis.shake = shake->axes[i];
+    if (!shake->shakes || axis.bits() == 0) continue;
     axis.slopes = LabelSlopes(labels[i].px);
     const StripeShare one = stripe_share(axis, labels[i]);
     sum.product += one.product;
@@ -476,11 +475,10 @@ Shake settle_shake(const std::vector<AxisLabels>& labels, std::array<AxisReading
   }
   // Without an answer the camera has moved: its stand is the lighter one.
   if (sum.count > 0 && sum.residuals / sum.count < k_most_share_stddev * k_most_share_stddev * sum.squared)
-    shake.share = std::clamp(sum.product / sum.squared, 0.0, 1.0);
+    shake->share = std::clamp(sum.product / sum.squared, 0.0, 1.0);
   for (AxisReading& axis : *axes) {
-    for (PairShake& pair : axis.shake) pair.shift_px *= shake.share;
+    for (PairShake& pair : axis.shake) pair.shift_px *= shake->share;
   }
-  return shake;
 }
 
 // Converts blocks of projector pixels to pixels.
@@ -582,7 +580,7 @@ Result<Decoded> decode(const Patterns& patterns,
   }
   Decoded decoded;
   cv::subtract(white, black, decoded.contrast);
-  decoded.quality = series.probe.quality(images);
+  decoded.quality = series.probe.quality(images, shake_of({axes[0].shake, axes[1].shake}));
   const DifferenceNoise noise =
       difference_noise(white, black, patterns.options.inverses, decoded.quality.noise);
   const LeastSteps steps =
@@ -594,7 +592,7 @@ Result<Decoded> decode(const Patterns& patterns,
                          ? labels_of(axes[axis], codes[axis], steps, noise, options, &doubted)
                          : any_label(steps.fine.size()));
   }
-  decoded.quality.shake = settle_shake(labels, &axes);
+  settle_shake(labels, &decoded.quality.shake, &axes);
   for (size_t axis = 0; axis < 2; ++axis) {
     if (axes[axis].bits() > 0) refine_between_edges(axes[axis], noise, options.floor_px, &labels[axis]);
     to_pixels(block, &labels[axis]);

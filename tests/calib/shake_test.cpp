@@ -142,6 +142,17 @@ TEST(Shake, IsNotFoundInAStillSeries) {
   }
 }
 
+TEST(Shake, HidesNoRepeatedImageAndLooksLikeNone) {
+  CodeBench bench = bench_of(Disturbed(26, 0.2, 0.015, test::test_rng()), true);
+  EXPECT_TRUE(decoded_of(bench).quality.odd.empty());
+  const auto files = bench.photograph(test::test_folder());
+  std::filesystem::copy_file(files[6], files[7], std::filesystem::copy_options::overwrite_existing);
+  const auto decoded = decode(bench.patterns, files, bench.width, bench.height);
+  ASSERT_TRUE(decoded.ok()) << decoded.message();
+  ASSERT_EQ(decoded->quality.odd.size(), 1U);
+  EXPECT_EQ(decoded->quality.odd[0].file.filename(), "007.png");
+}
+
 TEST(Shake, OfMoreThanAPixelIsMotion) {
   Disturbed moved(26, 0, 0, test::test_rng());
   for (size_t i = 12; i < 26; ++i) moved.shifts[i] = Vector2d(4, 0);
