@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int k_tap_half = 3;                // of the window of the Gaussian, pixels
+constexpr int k_tap_half = 3;                // half of the window of the Gaussian, pixels
 constexpr float k_tap_sigma = 1;             // pixels
 constexpr float k_least_place_gradient = 6;  // levels per pixel, in the sum of two images
 constexpr int k_full_level = 250;
