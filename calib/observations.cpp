@@ -315,8 +315,6 @@ Result<Observed> observe_pose(const CaptureSet& captures,
   const std::vector<BoardCorner> corners = find_board(captures.board, lit);
   seen.seconds_board = now() - started;
   if (corners.empty()) return seen;
-  for (const BoardCorner& corner : corners)
-    seen.observations.corners.push_back({camera, pose, corner.id, corner.px, corner.stddev_px});
   const double decoding = now();
   std::vector<Decoded> by_projector;
   for (size_t p = 0; p < captures.projectors.size(); ++p) {
@@ -344,6 +342,13 @@ Result<Observed> observe_pose(const CaptureSet& captures,
     }
     by_projector.push_back(std::move(decoded));
   }
+  // The corners are those of the white images, the matches those of the mean image.
+  Vector2d white_shift_px = Vector2d::Zero();
+  for (const Decoded& decoded : by_projector)
+    white_shift_px += decoded.quality.shake.white_shift_px / static_cast<double>(by_projector.size());
+  for (const BoardCorner& corner : corners)
+    seen.observations.corners.push_back(
+        {camera, pose, corner.id, corner.px - white_shift_px, corner.stddev_px});
   seen.observations.cameras = captures.cameras;
   add_room_points(by_projector, corners, camera, pose, k_room_points, &seen.observations);
   seen.seconds_decode = now() - decoding;

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
+#include <random>
 
 namespace limn::sim {
 namespace {
@@ -191,10 +192,24 @@ cv::Mat channel_light(const World& world,
   return light;
 }
 
+// Weights of a Gaussian blur that also displaces; without blur, of linear interpolation.
+cv::Mat shifted_kernel(double sigma, double shift) {
+  const int half = static_cast<int>(std::ceil(4 * sigma + std::abs(shift)));
+  cv::Mat kernel(2 * half + 1, 1, CV_32F);
+  for (int i = -half; i <= half; ++i) {
+    const double d = i - shift;
+    kernel.at<float>(i + half) = static_cast<float>(sigma > 0 ? std::exp(-d * d / (2 * sigma * sigma))
+                                                              : std::max(0.0, 1 - std::abs(d)));
+  }
+  // Filters of OpenCV correlate: the kernel is turned round.
+  cv::flip(kernel, kernel, 0);
+  return kernel / cv::sum(kernel)[0];
+}
+
 // Applies exposure and vignetting, which is quadratic in the distance from the image's middle.
-void expose_row(const CameraEffects& effects, cv::Mat& signal, int r) {
+void expose_row(const CameraEffects& effects, double gain, cv::Mat& signal, int r) {
   const auto width = static_cast<float>(signal.cols), height = static_cast<float>(signal.rows);
-  const auto exposure = static_cast<float>(effects.exposure);
+  const auto exposure = static_cast<float>(gain * effects.exposure);
   const float loss = static_cast<float>(effects.vignetting) * 4 / (width * width + height * height);
   const float dy = static_cast<float>(r) - (height - 1) / 2;
   auto* value = signal.ptr<float>(r);
@@ -305,18 +320,34 @@ cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const 
   return light;
 }
 
-cv::Mat exposed(const World& world, int camera, const cv::Mat& light) {
+Disturbance disturbance(const World& world, int camera, std::uint64_t seed) {
+  const CameraEffects& effects = world.camera_effects.at(static_cast<std::size_t>(camera));
+  constexpr std::uint64_t k_stream = 0x5851f42d4c957f2dU;  // tells these numbers from those of the noise
+  std::mt19937_64 rng(mixed(mixed(seed ^ k_stream) + static_cast<std::uint64_t>(camera)));
+  std::normal_distribution<double> normal(0, 1);
+  Disturbance drawn;
+  drawn.shift_px.x() = effects.shake_px * normal(rng);
+  drawn.shift_px.y() = effects.shake_px * normal(rng);
+  drawn.gain = std::max(0.0, 1 + effects.flicker * normal(rng));
+  return drawn;
+}
+
+cv::Mat exposed(const World& world, int camera, const cv::Mat& light, const Disturbance& disturbance) {
   const CameraEffects& effects = world.camera_effects.at(static_cast<std::size_t>(camera));
   cv::Mat signal(light.size(), light.type());
   const int side = 2 * static_cast<int>(std::ceil(4 * effects.psf_px)) + 1;
   in_row_strips(light.rows, [&](const cv::Range& rows) {
     cv::Mat strip = signal.rowRange(rows);  // the filter also reads rows outside its strip
-    if (effects.psf_px > 0)
+    if (!disturbance.shift_px.isZero(0))
+      cv::sepFilter2D(
+          light.rowRange(rows), strip, -1, shifted_kernel(effects.psf_px, disturbance.shift_px.x()),
+          shifted_kernel(effects.psf_px, disturbance.shift_px.y()), {-1, -1}, 0, cv::BORDER_REPLICATE);
+    else if (effects.psf_px > 0)
       cv::GaussianBlur(light.rowRange(rows), strip, {side, side}, effects.psf_px, effects.psf_px,
                        cv::BORDER_REPLICATE);
     else
       light.rowRange(rows).copyTo(strip);
-    for (int r = rows.start; r < rows.end; ++r) expose_row(effects, signal, r);
+    for (int r = rows.start; r < rows.end; ++r) expose_row(effects, disturbance.gain, signal, r);
   });
   return signal;
 }
@@ -338,7 +369,8 @@ cv::Mat photograph(const World& world,
                    std::span<const cv::Mat> shown,
                    std::uint64_t seed) {
   const cv::Mat light = ideal_light(world, samples, shown);
-  return digitised(world, samples.camera, exposed(world, samples.camera, light), seed);
+  const Disturbance disturbed = disturbance(world, samples.camera, seed);
+  return digitised(world, samples.camera, exposed(world, samples.camera, light, disturbed), seed);
 }
 
 }  // namespace limn::sim

@@ -19,9 +19,18 @@ double light_share(const ProjectorEffects& effects, int channel, double value);
 /// black level is applied. A projector's pixels are small squares, blurred where the surface is out of focus.
 cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown);
 
-/// The signal after lens and exposure: PSF, vignetting, exposure. Linear; 1 is full scale and may be
-/// exceeded.
-cv::Mat exposed(const World& world, int camera, const cv::Mat& light);
+/// How a frame differs from an undisturbed one: the image is displaced, all its light has a factor.
+struct Disturbance {
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
+  double gain = 1;
+};
+/// The disturbance of the frame with that seed, from the camera's shake and flicker. The same seed gives the
+/// same disturbance.
+Disturbance disturbance(const World& world, int camera, std::uint64_t seed);
+
+/// The signal after lens and exposure: disturbance, PSF, vignetting, exposure. Linear; 1 is full scale and
+/// may be exceeded.
+cv::Mat exposed(const World& world, int camera, const cv::Mat& light, const Disturbance& disturbance = {});
 
 /// The frame after the sensor: shot and read noise, encoding, black level, 8 bits. The same seed gives the
 /// same bytes.

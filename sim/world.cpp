@@ -90,7 +90,8 @@ Eigen::Matrix3d read_sensitivity(const ConfigNode& node) {
 
 CameraEffects read_camera_effects(const ConfigNode& node) {
   node.only({"name", "size", "lens", "imager_from_world", "eye_m", "target_m", "colour", "exposure", "psf_px",
-             "vignetting", "full_well_e", "read_noise", "black_level", "encoding", "sensitivity"});
+             "vignetting", "full_well_e", "read_noise", "black_level", "shake_px", "flicker", "encoding",
+             "sensitivity"});
   CameraEffects effects;
   effects.exposure = node.at("exposure").positive();
   if (const auto v = node.find("colour")) effects.colour = v->boolean();
@@ -99,6 +100,8 @@ CameraEffects read_camera_effects(const ConfigNode& node) {
   if (const auto v = node.find("full_well_e")) effects.full_well_e = not_negative(*v);
   if (const auto v = node.find("read_noise")) effects.read_noise = not_negative(*v);
   if (const auto v = node.find("black_level")) effects.black_level = not_negative(*v);
+  if (const auto v = node.find("shake_px")) effects.shake_px = at_most(10, *v);
+  if (const auto v = node.find("flicker")) effects.flicker = share(*v);
   if (const auto v = node.find("encoding")) effects.srgb = v->choice({"linear", "srgb"}) == "srgb";
   if (const auto v = node.find("sensitivity")) effects.sensitivity = read_sensitivity(*v);
   return effects;

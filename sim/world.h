@@ -32,6 +32,8 @@ struct CameraEffects {
   double full_well_e = 0;
   double read_noise = 0;   ///< Standard deviation in 8-bit levels of linear signal; 0: off.
   double black_level = 0;  ///< 8-bit level without light.
+  double shake_px = 0;     ///< Standard deviation of each frame's displacement, per axis; 0: off.
+  double flicker = 0;      ///< Standard deviation of the factor on each frame's light, about 1; 0: off.
   bool srgb = false;       ///< Encodes by the sRGB curve instead of linearly.
   /// Colour mixing of a colour camera, whose filters overlap: the rows are the camera's blue, green and red,
   /// the columns blue, green and red light. Identity: off. Not used by a grey camera.

@@ -34,6 +34,15 @@ constexpr double k_off_noise = 4.5;  // times a sum's noise, the second limit
 constexpr double k_same = 0.08;
 constexpr double k_odd_group = 0.05;   // share of samples that are off; motion at edges stays below
 constexpr double k_wrong_group = 0.5;  // the same; motion never causes that much
+// The same where images are displaced by some tenths of a pixel.
+constexpr double k_odd_shaken = 0.3, k_wrong_shaken = 0.8;
+// Contrast of an image's stripes: below the first, images of different patterns are as alike as k_same says;
+// above the second, a camera that is not linear leaves sums right to k_off.
+constexpr double k_resolved = 0.25, k_clear = 0.75;
+constexpr double k_both_ways = 0.1;  // share of the samples whose sums are too dark, and too bright
+// Light of an image without visible stripes, between black and white: a blurred pattern's. A camera with the
+// sRGB curve shows half of the light at 0.73.
+constexpr double k_grey_low = 0.2, k_grey_high = 0.85;
 
 // The illuminated samples of a series: the sums of their images, and their largest difference.
 struct Samples {
@@ -53,25 +62,43 @@ struct PairSums {
   float noise = 0;
 };
 
+// The scatter of sums about `middle`, times the level of their pair: flicker and blurred stripes of a camera
+// that is not linear change a pair as a whole.
+float noise_of(const std::vector<std::vector<float>>& sums, const std::vector<float>& middle) {
+  std::vector<float> deviations;
+  for (const std::vector<float>& pair : sums) {
+    std::vector<float> levels;
+    for (size_t at = 0; at < middle.size(); ++at) {
+      if (middle[at] > k_lit) levels.push_back(pair[at] / middle[at]);
+    }
+    const float level = median(std::move(levels), 1.0F);
+    for (size_t at = 0; at < middle.size(); ++at)
+      deviations.push_back(std::abs(pair[at] - level * middle[at]));
+  }
+  return static_cast<float>(1.4826 * median(std::move(deviations)));
+}
+
 PairSums pair_sums(const std::vector<PatternGroup>& groups, const std::vector<cv::Mat>& all) {
   PairSums pairs;
-  std::vector<float> sums, deviations;
-  for (int at = 0; at < all[0].cols; ++at) {
-    sums.clear();
-    float range = 0;
-    for (const PatternGroup& group : groups) {
-      if (!is_pair(group)) continue;
-      const int a = all[static_cast<size_t>(group.first)].at<uchar>(at);
-      const int b = all[static_cast<size_t>(group.first) + 1].at<uchar>(at);
-      sums.push_back(static_cast<float>(a + b));
-      range = std::max(range, static_cast<float>(std::abs(a - b)));
+  const auto samples = static_cast<size_t>(all[0].cols);
+  pairs.range.assign(samples, 0);
+  std::vector<std::vector<float>> sums;
+  for (const PatternGroup& group : groups) {
+    if (!is_pair(group)) continue;
+    const uchar *a = all[static_cast<size_t>(group.first)].ptr<uchar>(),
+                *b = all[static_cast<size_t>(group.first) + 1].ptr<uchar>();
+    sums.emplace_back();
+    for (size_t at = 0; at < samples; ++at) {
+      sums.back().push_back(static_cast<float>(a[at] + b[at]));
+      pairs.range[at] = std::max(pairs.range[at], static_cast<float>(std::abs(a[at] - b[at])));
     }
-    const auto middle = static_cast<float>(median(sums));
-    for (const float sum : sums) deviations.push_back(std::abs(sum - middle));
-    pairs.sum.push_back(middle);
-    pairs.range.push_back(range);
   }
-  pairs.noise = static_cast<float>(1.4826 * median(std::move(deviations)));
+  std::vector<float> own(sums.size());
+  for (size_t at = 0; at < samples; ++at) {
+    for (size_t i = 0; i < sums.size(); ++i) own[i] = sums[i][at];
+    pairs.sum.push_back(median(own));
+  }
+  pairs.noise = noise_of(sums, pairs.sum);
   return pairs;
 }
 
@@ -120,6 +147,38 @@ GroupQuality quality_of(const Samples& lit, const PatternGroup& group) {
   return quality;
 }
 
+// What an image shows of its stripes: its mean light between black (0) and white (1), and how much of the
+// full contrast they have.
+struct Stripes {
+  double light = 0, contrast = 0;
+  bool is_between() const { return light > k_grey_low && light < k_grey_high; }
+  bool is_grey() const { return contrast < k_resolved && is_between(); }
+};
+
+Stripes stripes_of(const Samples& lit, int image) {
+  double own = 0, sum = 0, range = 0, apart = 0;
+  for (size_t i = 0; i < lit.size(); ++i) {
+    own += lit.of(image)[i];
+    sum += lit.sum[i];
+    range += lit.range[i];
+  }
+  const auto mean = static_cast<float>(own / sum);
+  for (size_t i = 0; i < lit.size(); ++i) apart += std::abs(lit.of(image)[i] - mean * lit.sum[i]);
+  return {(own - (sum - range) / 2) / range, 2 * apart / range};
+}
+
+// Whether a pair is too dark at some samples and too bright at others. A camera that is not linear makes
+// blurred stripes err one way.
+bool errs_both_ways(const Samples& lit, int first) {
+  size_t dark = 0, bright = 0;
+  for (size_t i = 0; i < lit.size(); ++i) {
+    const double error = lit.of(first)[i] + lit.of(first + 1)[i] - lit.sum[i];
+    dark += error < -k_off * lit.range[i] ? 1 : 0;
+    bright += error > k_off * lit.range[i] ? 1 : 0;
+  }
+  return static_cast<double>(std::min(dark, bright)) > k_both_ways * static_cast<double>(lit.size());
+}
+
 // Mean difference of two images over the samples, as a share of their range; `inverse`: uses the complement
 // of the second image.
 double difference(const Samples& lit, int a, int b, bool inverse) {
@@ -164,12 +223,21 @@ void find_odd(const Samples& lit,
               const std::vector<PatternGroup>& groups,
               const std::vector<std::filesystem::path>& files,
               CaptureQuality* quality) {
+  // Where camera or board vibrates, the edges of ink and of fine stripes are off.
+  const bool shakes = quality->shake.shakes;
+  const double limit = shakes ? k_odd_shaken : k_odd_group, wrong = shakes ? k_wrong_shaken : k_wrong_group;
   for (const GroupQuality& group : quality->groups) {
     if (group.count != 2) continue;
-    if (group.off < k_odd_group) continue;
+    if (group.off < limit) continue;
+    // Blur takes the contrast of the finest stripes. They all look alike then, and where a camera is not
+    // linear they do not add up to white and black.
+    const Stripes first = stripes_of(lit, group.first), second = stripes_of(lit, group.first + 1);
+    if (first.is_grey() && second.is_grey()) continue;
+    const bool is_clear = std::max(first.contrast, second.contrast) > k_clear || !first.is_between() ||
+                          !second.is_between() || errs_both_ways(lit, group.first);
     if (auto odd = finding(lit, groups, files, group.first)) {
       quality->odd.push_back(std::move(*odd));
-    } else if (group.off > k_wrong_group) {
+    } else if (group.off > wrong && is_clear) {
       const auto name = files[static_cast<size_t>(group.first) + 1].filename().string();
       quality->odd.push_back({files[static_cast<size_t>(group.first)],
                               "and " + name + " do not add up to what the other pairs do"});
@@ -348,8 +416,10 @@ void CaptureQualityProbe::add_image(int index, const cv::Mat& image) {
   cv::add(*sum, reduced, *sum, cv::noArray(), CV_32F);
 }
 
-CaptureQuality CaptureQualityProbe::quality(const std::vector<std::filesystem::path>& files) const {
+CaptureQuality CaptureQualityProbe::quality(const std::vector<std::filesystem::path>& files,
+                                            const Shake& shake) const {
   CaptureQuality quality;
+  quality.shake = shake;
   const std::vector<PatternGroup> groups = patterns_.groups();
   const Samples lit = lit_samples(groups, samples_);
   quality.samples = static_cast<int>(lit.size());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "calib/code/patterns.h"
+#include "calib/code/shake.h"
 
 namespace limn::calib {
 
@@ -57,6 +58,9 @@ struct CaptureQuality {
   int shift_patches = 0;  ///< number of patches with texture; 0: motion is not measured
   /// Share of the illuminated pixels whose finest bit is unsure, on the worse axis: a measure of defocus.
   double unsure_finest = 0;
+  /// What decoding has taken out because camera, board or light was not still. The labels belong to the mean
+  /// of the series' images: a point that white shows at p is there at p - shake.white_shift_px.
+  Shake shake;
   IntensityNoise noise;  ///< from the scatter of the pairs' sums; this default when there are too few samples
 };
 
@@ -67,8 +71,9 @@ class CaptureQualityProbe {
   CaptureQualityProbe(const Patterns& patterns, int width, int height);
   /// Adds image number `index`, 8-bit grey; every index once, in any order.
   void add_image(int index, const cv::Mat& image);
-  /// Call it after all images. `files`: the images' names.
-  CaptureQuality quality(const std::vector<std::filesystem::path>& files) const;
+  /// Call it after all images. `files`: the images' names. `shake`: what their pairs show; its edges are no
+  /// sign of a wrong image.
+  CaptureQuality quality(const std::vector<std::filesystem::path>& files, const Shake& shake = {}) const;
 
  private:
   Patterns patterns_;

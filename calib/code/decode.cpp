@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <span>
 
 #include "calib/code/phase.h"
@@ -342,7 +343,8 @@ struct Series {
   cv::Size size;
   CaptureQualityProbe probe;
   DirectLight direct;
-  int used_bits;  // those of white, so that all images have the same levels
+  int used_bits;                             // those of white, so that all images have the same levels
+  std::optional<ShakeReference> shake = {};  // set after white and black; pairs are compared with it
 
   Result<cv::Mat> read(int index) {
     LIMN_TRY(const cv::Mat image,
@@ -369,6 +371,7 @@ Status read_bits(int first, const Code& code, const cv::Mat& both, Series* serie
     cv::subtract(image, inverse, difference, cv::noArray(), CV_16S);
     axis->differences.push_back(difference);
     if (measures_direct_light(code.lowest + code.bits - 1 - i, code)) series->direct.add_pair(image, inverse);
+    if (series->shake) axis->shake.push_back(series->shake->measure(image, inverse));
   }
   return {};
 }
@@ -447,8 +450,35 @@ AxisLabels labels_of(const AxisReading& axis,
   doubt(static_cast<float>(options.max_from_median), &labels, doubted);
   for (int pass = 0; pass < k_settle_passes; ++pass)
     settle_by_neighbours(axis, code, noise, steps.fine, &labels);
-  refine_between_edges(axis, noise, options.floor_px, &labels);
   return labels;
+}
+
+// Largest standard deviation of the share of a shake that the stripes follow.
+constexpr double k_most_share_stddev = 0.2;
+
+// Says in the readings what a shake has done to their pairs: the displacement as far as the stripes follow
+// it.
+void settle_shake(const std::vector<AxisLabels>& labels, Shake* shake, std::array<AxisReading, 2>* axes) {
+  StripeShare sum;
+  for (size_t i = 0; i < 2; ++i) {
+    AxisReading& axis = (*axes)[i];
+    axis.shake.clear();
+    if (!shake->shakes && !shake->flickers) continue;
+    axis.shake = shake->axes[i];
+    if (!shake->shakes || axis.bits() == 0) continue;
+    axis.slopes = LabelSlopes(labels[i].px);
+    const StripeShare one = stripe_share(axis, labels[i]);
+    sum.product += one.product;
+    sum.squared += one.squared;
+    sum.residuals += one.residuals;
+    sum.count += one.count;
+  }
+  // Without an answer the camera has moved: its stand is the lighter one.
+  if (sum.count > 0 && sum.residuals / sum.count < k_most_share_stddev * k_most_share_stddev * sum.squared)
+    shake->share = std::clamp(sum.product / sum.squared, 0.0, 1.0);
+  for (AxisReading& axis : *axes) {
+    for (PairShake& pair : axis.shake) pair.shift_px *= shake->share;
+  }
 }
 
 // Converts blocks of projector pixels to pixels.
@@ -540,6 +570,7 @@ Result<Decoded> decode(const Patterns& patterns,
   std::array<AxisReading, 2> axes;
   cv::Mat both;
   cv::add(white, black, both, cv::noArray(), CV_16S);
+  if (patterns.options.inverses) series.shake.emplace(white, black);
   LIMN_TRY_STATUS(read_bits(0, codes[0], both, &series, &axes[0]));
   LIMN_TRY_STATUS(read_bits(patterns.first_row_bit(), codes[1], both, &series, &axes[1]));
   std::vector<PhaseReading> waves;
@@ -549,7 +580,7 @@ Result<Decoded> decode(const Patterns& patterns,
   }
   Decoded decoded;
   cv::subtract(white, black, decoded.contrast);
-  decoded.quality = series.probe.quality(images);
+  decoded.quality = series.probe.quality(images, shake_of({axes[0].shake, axes[1].shake}));
   const DifferenceNoise noise =
       difference_noise(white, black, patterns.options.inverses, decoded.quality.noise);
   const LeastSteps steps =
@@ -560,8 +591,12 @@ Result<Decoded> decode(const Patterns& patterns,
     labels.push_back(axes[axis].bits() > 0
                          ? labels_of(axes[axis], codes[axis], steps, noise, options, &doubted)
                          : any_label(steps.fine.size()));
-    to_pixels(block, &labels.back());
-    if (!waves.empty()) refine_by_phase(waves[axis], noise, options.floor_px, &labels.back());
+  }
+  settle_shake(labels, &decoded.quality.shake, &axes);
+  for (size_t axis = 0; axis < 2; ++axis) {
+    if (axes[axis].bits() > 0) refine_between_edges(axes[axis], noise, options.floor_px, &labels[axis]);
+    to_pixels(block, &labels[axis]);
+    if (!waves.empty()) refine_by_phase(waves[axis], noise, options.floor_px, &labels[axis]);
   }
   decoded.decoded = join(labels[0], labels[1], &decoded);
   const int contradicted = count_unlabelled(doubted, decoded.px_projector);

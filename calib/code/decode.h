@@ -58,10 +58,10 @@ struct Decoded {
 /// neighbours) gets that edge. Where the bits are more ambiguous, and where a single label contradicts its
 /// neighbours, the labels near the neighbours' are compared by how much noise each would need; without a
 /// likely one the pixel has no label. Labels then become subpixel coordinates, by the stripes' edges
-/// (calib/code/subpixel.h) or by the phase (calib/code/phase.h). Variances follow from the noise that the
-/// series itself shows.
-/// `width` x `height`: the camera's size. An image of another size, a missing or a damaged one is an error
-/// that names the file.
+/// (calib/code/subpixel.h) or by the phase (calib/code/phase.h); displacements of the images against each
+/// other and flicker are taken out of the edges (calib/code/shake.h). Variances follow from the noise that
+/// the series itself shows. `width` x `height`: the camera's size. An image of another size, a missing or a
+/// damaged one is an error that names the file.
 Result<Decoded> decode(const Patterns& patterns,
                        const std::vector<std::filesystem::path>& images,
                        int width,

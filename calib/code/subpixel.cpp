@@ -1,9 +1,12 @@
 #include "calib/code/subpixel.h"
 
+#include <Eigen/Dense>
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <optional>
 
 namespace limn::calib {
 namespace {
@@ -11,11 +14,15 @@ namespace {
 constexpr float k_no_label = std::numeric_limits<float>::quiet_NaN();
 // Camera pixels between two edges; over more, a line does not describe the surface.
 constexpr int k_longest = 64;
+constexpr int k_field = 16;           // side of a field that a plane is fitted to, camera pixels
+constexpr double k_one_surface = 1;   // labels, root mean square beside the plane
+constexpr size_t k_least_edges = 12;  // in a field
 
 // A position on a line of camera pixels where a label's edge appears.
 struct Crossing {
   int edge = -1;       // between labels edge - 1 and edge; -1: none
   float at = 0;        // camera pixels along the line
+  float label = 0;     // the coordinate there, labels
   float variance = 0;  // variance of `at`, camera pixels^2
 };
 
@@ -43,11 +50,11 @@ void fill_between(
     const Crossing& first, const Crossing& second, float floor, float* value, float* weight, size_t step) {
   const int from = static_cast<int>(std::floor(first.at)) + 1, to = static_cast<int>(std::floor(second.at));
   const float length = second.at - first.at;
-  const auto rise = static_cast<float>(second.edge - first.edge);
+  const float rise = second.label - first.label;
   const float scale = (rise / length) * (rise / length);
   for (int i = from; i <= to; ++i) {
     const float share = (static_cast<float>(i) - first.at) / length;
-    const float u = static_cast<float>(first.edge) - 0.5F + share * rise;
+    const float u = first.label + share * rise;
     const float variance =
         scale * ((1 - share) * (1 - share) * first.variance + share * share * second.variance) + floor;
     value[static_cast<size_t>(i) * step] += u / variance;
@@ -60,25 +67,43 @@ struct Place {
   const short *low_a, *end_a, *low_b, *end_b;
 };
 
+// One axis with all that its coordinates are computed from.
+struct Axis {
+  const AxisReading& reading;
+  const DifferenceNoise& noise;
+  const AxisLabels& labels;
+  float floor;
+};
+
 // Finds where the difference of the bit that changes at `edge` crosses zero between pixels a and b; `at` is
 // the position along the line.
-Crossing crossing(const AxisReading& reading, int edge, cv::Point a, cv::Point b, int at, float variance) {
-  const cv::Mat& difference = reading.at_edge(edge);
-  const float first = difference.ptr<short>(a.y)[a.x], second = difference.ptr<short>(b.y)[b.x];
+Crossing crossing(const Axis& axis, int edge, cv::Point a, cv::Point b, int at) {
+  const size_t bit = axis.reading.bit_at_edge(edge);
+  const cv::Mat& difference = axis.reading.differences[bit];
+  float first = difference.ptr<short>(a.y)[a.x], second = difference.ptr<short>(b.y)[b.x];
   if ((first > 0) == (second > 0)) return {};
-  const float step = first - second, share = first / step;
-  return {edge, static_cast<float>(at) + share,
-          variance * ((1 - share) * (1 - share) + share * share) / (step * step)};
+  float label = static_cast<float>(edge) - 0.5F;
+  const float step = first - second, variance = axis.noise.at(a.x, a.y);
+  float share = first / step;
+  const float scale = variance * ((1 - share) * (1 - share) + share * share) / (step * step);
+  if (!axis.reading.shake.empty()) {
+    const PairShake& shake = axis.reading.shake[bit];
+    const auto more = static_cast<float>(shake.gain_difference / 2);
+    share = (first - more * axis.noise.sum.ptr<ushort>(a.y)[a.x]) / step;
+    const cv::Vec2f slope = axis.reading.slopes.at(a.x, a.y);
+    const float moved =
+        slope[0] * static_cast<float>(shake.shift_px.x()) + slope[1] * static_cast<float>(shake.shift_px.y());
+    if (!std::isnan(moved)) label += moved;
+  }
+  return {edge, static_cast<float>(at) + share, label, scale};
 }
 
 // Moves from pixel a to pixel b of a line; `last` is the previous edge.
-void pass(const AxisReading& reading,
-          const DifferenceNoise& noise,
+void pass(const Axis& axis,
           const Place& labels,
           cv::Point a,
           cv::Point b,
           int at,
-          float floor,
           Crossing* last,
           float* value,
           float* weight,
@@ -88,31 +113,24 @@ void pass(const AxisReading& reading,
   if (low_a == low_b && end_a == end_b && low_a != end_a) return;
   if (nested(low_a, end_a, low_b, end_b)) return;  // the same label, perhaps a coarser one
   const int edge = edge_between(low_a, end_a, low_b, end_b);
-  const Crossing next = edge > 0 ? crossing(reading, edge, a, b, at, noise.at(a.x, a.y)) : Crossing{};
+  const Crossing next = edge > 0 ? crossing(axis, edge, a, b, at) : Crossing{};
   if (last->edge >= 0 && next.edge >= 0 && next.edge != last->edge && next.at - last->at < k_longest)
-    fill_between(*last, next, floor, value, weight, step);
+    fill_between(*last, next, axis.floor, value, weight, step);
   *last = next;
 }
 
-void along_rows(const AxisReading& reading,
-                const DifferenceNoise& noise,
-                const AxisLabels& labels,
-                float floor,
-                Sums* sums) {
-  for (int y = 0; y < labels.low.rows; ++y) {
-    const short *low = labels.low.ptr<short>(y), *end = labels.end.ptr<short>(y);
+void along_rows(const Axis& axis, Sums* sums) {
+  for (int y = 0; y < axis.labels.low.rows; ++y) {
+    const short *low = axis.labels.low.ptr<short>(y), *end = axis.labels.end.ptr<short>(y);
     float *value = sums->value.ptr<float>(y), *weight = sums->weight.ptr<float>(y);
     Crossing last;
-    for (int x = 0; x + 1 < labels.low.cols; ++x)
-      pass(reading, noise, {low, end, low, end}, {x, y}, {x + 1, y}, x, floor, &last, value, weight, 1);
+    for (int x = 0; x + 1 < axis.labels.low.cols; ++x)
+      pass(axis, {low, end, low, end}, {x, y}, {x + 1, y}, x, &last, value, weight, 1);
   }
 }
 
-void along_columns(const AxisReading& reading,
-                   const DifferenceNoise& noise,
-                   const AxisLabels& labels,
-                   float floor,
-                   Sums* sums) {
+void along_columns(const Axis& axis, Sums* sums) {
+  const AxisLabels& labels = axis.labels;
   const auto columns = static_cast<size_t>(labels.low.cols);
   std::vector<Crossing> last(columns);
   float *value = sums->value.ptr<float>(), *weight = sums->weight.ptr<float>();
@@ -120,16 +138,114 @@ void along_columns(const AxisReading& reading,
     const Place place = {labels.low.ptr<short>(y), labels.end.ptr<short>(y), labels.low.ptr<short>(y + 1),
                          labels.end.ptr<short>(y + 1)};
     for (int x = 0; x < labels.low.cols; ++x)
-      pass(reading, noise, place, {x, y}, {x, y + 1}, y, floor, &last[static_cast<size_t>(x)], value + x,
-           weight + x, columns);
+      pass(axis, place, {x, y}, {x, y + 1}, y, &last[static_cast<size_t>(x)], value + x, weight + x, columns);
   }
+}
+
+// A plane u = offset + slope . (x, y) through points; nullopt when they lie on a line.
+struct LabelPlane {
+  Eigen::Vector3d values;
+  Eigen::Matrix3d inverse;
+};
+std::optional<LabelPlane> plane_through(const std::vector<Eigen::Vector3d>& at,
+                                        const std::vector<double>& value) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d product = Eigen::Vector3d::Zero();
+  for (size_t i = 0; i < at.size(); ++i) {
+    normal += at[i] * at[i].transpose();
+    product += at[i] * value[i];
+  }
+  if (!(normal.determinant() > 1e-3 * static_cast<double>(at.size()))) return std::nullopt;
+  const Eigen::Matrix3d inverse = normal.inverse();
+  return LabelPlane{inverse * product, inverse};
+}
+
+// The slope of one field's labels; NaN when they do not lie on one surface.
+cv::Vec2f slope_of(const cv::Mat& px, int left, int top) {
+  std::vector<Eigen::Vector3d> at;
+  std::vector<double> value;
+  for (int y = top; y < std::min(px.rows, top + k_field); ++y) {
+    for (int x = left; x < std::min(px.cols, left + k_field); ++x) {
+      const float label = px.ptr<float>(y)[x];
+      if (std::isnan(label)) continue;
+      at.emplace_back(1, x - left, y - top);
+      value.push_back(label);
+    }
+  }
+  const auto plane = at.size() < k_field * k_field / 4 ? std::nullopt : plane_through(at, value);
+  if (!plane) return {k_no_label, k_no_label};
+  double squared = 0;
+  for (size_t i = 0; i < at.size(); ++i) {
+    const double residual = value[i] - plane->values.dot(at[i]);
+    squared += residual * residual;
+  }
+  if (squared > k_one_surface * k_one_surface * static_cast<double>(at.size()))
+    return {k_no_label, k_no_label};
+  return {static_cast<float>(plane->values[1]), static_cast<float>(plane->values[2])};
+}
+
+// The edges of one field's labels, where the camera shows them.
+struct FieldEdges {
+  std::vector<Eigen::Vector3d> at;   // 1, x, y
+  std::vector<double> label, moved;  // `moved`: by the shake, if the stripes follow it
+};
+
+// Adds one field: what its edges lie beside a plane is compared with the shake.
+void add_field(const FieldEdges& edges, StripeShare* share) {
+  if (edges.at.size() < k_least_edges) return;
+  const auto labels = plane_through(edges.at, edges.label), moved = plane_through(edges.at, edges.moved);
+  if (!labels || !moved) return;
+  double squared = 0, product = 0, own = 0;
+  for (size_t i = 0; i < edges.at.size(); ++i) {
+    const double residual = edges.label[i] - labels->values.dot(edges.at[i]);
+    const double expected = edges.moved[i] - moved->values.dot(edges.at[i]);
+    own += residual * residual;
+    product -= residual * expected;
+    squared += expected * expected;
+  }
+  if (own > k_one_surface * k_one_surface * static_cast<double>(edges.at.size())) return;
+  share->product += product;
+  share->squared += squared;
+  share->residuals += own;
+  share->count += static_cast<int>(edges.at.size());
 }
 
 }  // namespace
 
-const cv::Mat& AxisReading::at_edge(int edge) const {
+size_t AxisReading::bit_at_edge(int edge) const {
   const int bit = std::countr_zero(static_cast<unsigned>(edge));  // the bit that Gray code changes there
-  return differences[static_cast<size_t>(bits() - 1 - bit)];
+  return static_cast<size_t>(bits() - 1 - bit);
+}
+
+LabelSlopes::LabelSlopes(const cv::Mat& px)
+    : slopes_((px.rows + k_field - 1) / k_field,
+              (px.cols + k_field - 1) / k_field,
+              CV_32FC2,
+              cv::Scalar(k_no_label, k_no_label)) {
+  cv::Mat known = slopes_.clone();
+  for (int y = 0; y < known.rows; ++y) {
+    for (int x = 0; x < known.cols; ++x) known.at<cv::Vec2f>(y, x) = slope_of(px, x * k_field, y * k_field);
+  }
+  for (int y = 0; y < known.rows; ++y) {
+    for (int x = 0; x < known.cols; ++x) {
+      cv::Vec2f sum(0, 0);
+      float count = 0;
+      const int reach = std::isnan(known.at<cv::Vec2f>(y, x)[0]) ? 1 : 0;
+      for (int v = std::max(0, y - reach); v <= std::min(known.rows - 1, y + reach); ++v) {
+        for (int u = std::max(0, x - reach); u <= std::min(known.cols - 1, x + reach); ++u) {
+          if (std::isnan(known.at<cv::Vec2f>(v, u)[0])) continue;
+          sum += known.at<cv::Vec2f>(v, u);
+          ++count;
+        }
+      }
+      if (count > 0) slopes_.at<cv::Vec2f>(y, x) = sum / count;
+    }
+  }
+}
+
+cv::Vec2f LabelSlopes::at(int x, int y) const {
+  return slopes_.empty() ? cv::Vec2f(k_no_label, k_no_label)
+                         : slopes_.ptr<cv::Vec2f>(y / k_field)[x / k_field];
 }
 
 AxisLabels::AxisLabels(int rows, int cols)
@@ -138,15 +254,48 @@ AxisLabels::AxisLabels(int rows, int cols)
       px(rows, cols, CV_32F, cv::Scalar(k_no_label)),
       variance(rows, cols, CV_32F, cv::Scalar(k_no_label)) {}
 
+StripeShare stripe_share(const AxisReading& reading, const AxisLabels& labels) {
+  StripeShare share;
+  const cv::Size size = labels.low.size();
+  for (int top = 0; top < size.height; top += k_field) {
+    for (int left = 0; left < size.width; left += k_field) {
+      FieldEdges edges;
+      const cv::Vec2f slope = reading.slopes.at(left, top);
+      if (std::isnan(slope[0])) continue;
+      const bool upright = std::abs(slope[0]) > std::abs(slope[1]);
+      const cv::Point step = upright ? cv::Point(1, 0) : cv::Point(0, 1);
+      for (int y = top; y < std::min(size.height - step.y, top + k_field); ++y) {
+        for (int x = left; x < std::min(size.width - step.x, left + k_field); ++x) {
+          const cv::Point a(x, y), b = a + step;
+          const int edge = edge_between(labels.low.at<short>(a), labels.end.at<short>(a),
+                                        labels.low.at<short>(b), labels.end.at<short>(b));
+          if (edge <= 0) continue;
+          const size_t bit = reading.bit_at_edge(edge);
+          const float first = reading.differences[bit].at<short>(a),
+                      second = reading.differences[bit].at<short>(b);
+          if ((first > 0) == (second > 0)) continue;
+          const double part = first / (first - second);
+          const Eigen::Vector2d& shift = reading.shake[bit].shift_px;
+          edges.at.emplace_back(1, x - left + part * step.x, y - top + part * step.y);
+          edges.label.push_back(edge - 0.5);
+          edges.moved.push_back(slope[0] * shift.x() + slope[1] * shift.y());
+        }
+      }
+      add_field(edges, &share);
+    }
+  }
+  return share;
+}
+
 void refine_between_edges(const AxisReading& reading,
                           const DifferenceNoise& noise,
                           double floor_px,
                           AxisLabels* labels) {
-  const auto floor = static_cast<float>(floor_px * floor_px);
+  const Axis axis{reading, noise, *labels, static_cast<float>(floor_px * floor_px)};
   Sums sums{cv::Mat(labels->low.size(), CV_32F, cv::Scalar(0)),
             cv::Mat(labels->low.size(), CV_32F, cv::Scalar(0))};
-  along_rows(reading, noise, *labels, floor, &sums);
-  along_columns(reading, noise, *labels, floor, &sums);
+  along_rows(axis, &sums);
+  along_columns(axis, &sums);
   for (int y = 0; y < sums.value.rows; ++y) {
     const float *value = sums.value.ptr<float>(y), *weight = sums.weight.ptr<float>(y);
     float *px = labels->px.ptr<float>(y), *variance = labels->variance.ptr<float>(y);
@@ -154,7 +303,7 @@ void refine_between_edges(const AxisReading& reading,
       // The two directions share noise and floor, so the variance is that of the better one.
       if (weight[x] * variance[x] <= 1 || std::isnan(px[x])) continue;
       px[x] = value[x] / weight[x];
-      variance[x] = std::max(1 / weight[x], floor);
+      variance[x] = std::max(1 / weight[x], axis.floor);
     }
   }
 }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "calib/judge/fault_costs.h"
 #include "calib/judge/lens_uncertainty.h"
 #include "calib/judge/uncertainty.h"
 #include "core/median.h"
@@ -192,6 +193,7 @@ Assessment assess(const Observed& observed,
   assessment.faults = merged(faults(observed, solution, assessment.devices, assessment.held_out));
   const double px = assessment.held_out.rms_px;
   const double mm = assessment.worst_predicted_mm();
+  state_costs(observations, solution, mm, &assessment.faults);
   const double on_boards_mm =
       *std::max_element(assessment.held_out_error_mm.begin(), assessment.held_out_error_mm.end());
   const bool extrapolates = mm > std::max(k_fine_mm, k_beyond_boards * on_boards_mm);

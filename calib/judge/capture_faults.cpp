@@ -26,6 +26,11 @@ constexpr double k_same_px = 1;       // two projectors' labels at one camera pi
 constexpr double k_same_share = 0.3;  // share of the pixels that both projectors illuminate
 // Range of coarse pairs' sums; a camera that is not linear shows 0.017.
 constexpr double k_level_range = 0.03;
+// The same for flicker that is taken out, in root mean squares of one image's: the range of 20 sums of two.
+constexpr double k_flicker_range = 4;
+// Displacement of a stripe's edge, camera pixels, for a flicker of 1: half of the gains' difference over the
+// slope of an edge with a blur of 0.8 pixels.
+constexpr double k_edge_px = 0.7;
 constexpr int k_wide_stripe_px = 16;       // stripes of this width keep all of their contrast under blur
 constexpr double k_white_contrast = 0.15;  // deviation from 1; indirect light adds 0.04 to white
 // Amount below 1; sharp captures show 1.36 over stripes of 4 pixels.
@@ -41,11 +46,13 @@ constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
 // Share of full contrast that is left on stripes of 2 pixels: a blur of 1.2 pixels (standard deviation)
 // leaves 0.15; with less, edges are found from coarser bits alone.
 constexpr double k_sharp = 0.15;
-constexpr double k_seen_stripe_px = 1.4;  // in camera pixels; narrower stripes blur in the sharpest camera
-constexpr double k_pedestal = 16;         // maximum number of levels that sensors add to black
-constexpr double k_room_share = 0.6;      // the room's share of white's light
-constexpr double k_rough_aspect = 0.05;   // deviation of fy / fx from 1, from homographies alone
-constexpr size_t k_least_corners = 8;     // minimum for a homography that noise does not distort
+constexpr double k_in_focus = 0.5;         // the same of sound captures
+constexpr double k_least_contrast = 0.01;  // noise hides less
+constexpr double k_seen_stripe_px = 1.4;   // in camera pixels; narrower stripes blur in the sharpest camera
+constexpr double k_pedestal = 16;          // maximum number of levels that sensors add to black
+constexpr double k_room_share = 0.6;       // the room's share of white's light
+constexpr double k_rough_aspect = 0.05;    // deviation of fy / fx from 1, from homographies alone
+constexpr size_t k_least_corners = 8;      // minimum for a homography that noise does not distort
 constexpr double k_saturated_share = 0.2;
 // Deviation of the waves' mean light from one half: as for a gamma that is 12 % off. Beyond it the phase of 3
 // steps errs by 0.1 pixel in waves of 16; 6 steps tolerate more.
@@ -287,12 +294,19 @@ double white_contrast(const PairSeries& seen, const CaptureQuality& quality) {
   return quality.groups.back().contrast / widest;
 }
 
+// The flicker that decoding has taken out of a series; 0: none.
+double flicker_of(const CaptureQuality& quality) {
+  return quality.shake.flickers ? quality.shake.gain_rms : 0;
+}
+
+// Flicker of single images is not drift.
 bool note_exposure(const PairSeries& seen, std::vector<Fault>* faults) {
+  const double limit = std::max(k_level_range, k_flicker_range * seen.median_of(flicker_of));
   const double range = seen.median_of([&](const CaptureQuality& h) { return level_range(seen, h); });
   const double white = seen.median_of([&](const CaptureQuality& h) { return white_contrast(seen, h); });
   const bool narrow = seen.series[0]->widest_stripe_px < k_wide_stripe_px;
   const bool white_fits = narrow ? white > 1 - k_white_under_narrow : std::abs(white - 1) < k_white_contrast;
-  if (range < k_level_range && white_fits) return false;
+  if (range < limit && white_fits) return false;
   faults->push_back(
       {FaultName::exposure_drift,
        fmt::format("{}: the sum of an image and its inverse changes by {:.1f} % within a series; the "
@@ -303,11 +317,61 @@ bool note_exposure(const PairSeries& seen, std::vector<Fault>* faults) {
   return true;
 }
 
+// The poses whose series have a value above 0, and the median of these values.
+struct PosesWith {
+  std::vector<std::string> poses;
+  std::vector<double> values;
+};
+template <typename F>
+PosesWith poses_with(const PairSeries& seen, F&& value) {
+  PosesWith found;
+  for (const CaptureQuality* quality : seen.series) {
+    const double one = value(*quality);
+    if (!(one > 0)) continue;
+    found.poses.push_back(seen.pose_name(*quality));
+    found.values.push_back(one);
+  }
+  return found;
+}
+
+void note_shake(const PairSeries& seen, std::vector<Fault>* faults) {
+  const auto vibrates = [](const CaptureQuality& quality) {
+    return quality.shake.shakes && !quality.shake.drifts;
+  };
+  const PosesWith shaken =
+      poses_with(seen, [&](const CaptureQuality& h) { return vibrates(h) ? h.shake.shift_rms_px : 0; });
+  if (shaken.poses.empty()) return;
+  const double share =
+      seen.median_of([&](const CaptureQuality& h) { return vibrates(h) ? h.shake.share : 1; });
+  faults->push_back(
+      {FaultName::shake,
+       fmt::format("{}: the images of a series are displaced by {:.2f} px (root mean square) against each "
+                   "other, {}; it was measured and taken out",
+                   seen.both(), median(shaken.values),
+                   share > 0.5 ? "stripes and board alike: the camera vibrates" : "the board vibrates"),
+       "put the tripods and the board on firm ground, keep people and machines still during a series",
+       Severity::note, shaken.poses, 1, median(shaken.values)});
+}
+
+void note_flicker(const PairSeries& seen, std::vector<Fault>* faults) {
+  const PosesWith flickering = poses_with(seen, flicker_of);
+  if (flickering.poses.empty()) return;
+  faults->push_back(
+      {FaultName::flicker,
+       fmt::format("{}: the light of single images differs by {:.1f} % (root mean square); it was measured "
+                   "and taken out",
+                   seen.both(), 100 * median(flickering.values)),
+       "expose for whole periods of the lamp and of the mains (multiples of 1/50 or 1/60 s), with a fixed "
+       "exposure",
+       Severity::note, flickering.poses, 1, k_edge_px * median(flickering.values)});
+}
+
 void note_motion(const PairSeries& seen, std::vector<Fault>* faults) {
   const CapturedDevice& camera = seen.observed.observations.cameras[static_cast<size_t>(seen.camera)];
   const double limit = std::max(k_shift_px, k_shift_share * camera.width);
   for (const CaptureQuality* quality : seen.series) {
     if (quality->shift_patches < 4 || quality->shift_px < limit) continue;
+    if (quality->shake.shakes && !quality->shake.drifts) continue;  // shake is taken out
     faults->push_back(
         {FaultName::moved_during_capture,
          fmt::format("{}, {}: the image moved by {:.2f} px (parts of it by {:.2f} px) between the first "
@@ -348,10 +412,13 @@ Sharpness sharpness(const PairSeries& seen, const CaptureQuality& quality) {
   return found;
 }
 
-bool note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
+void note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
   const double contrast =
       seen.median_of([&](const CaptureQuality& h) { return sharpness(seen, h).contrast; });
-  if (contrast >= k_sharp) return false;
+  if (contrast >= k_sharp) return;
+  // Stripes of a Gaussian blur keep the contrast exp(-(pi blur / width)^2 / 2); the scatter of an edge is
+  // proportional to the blur. In focus it is that of k_in_focus.
+  const double blurs = std::sqrt(std::log(std::max(contrast, k_least_contrast)) / std::log(k_in_focus));
   faults->push_back(
       {FaultName::defocus,
        fmt::format(
@@ -359,8 +426,10 @@ bool note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
            "{:.0f} %",
            seen.both(), sharpness(seen, *seen.series[0]).stripe_px, 100 * contrast, 100 * k_sharp),
        "focus the projector at the prototype's distance, then the camera; close the camera's aperture a "
-       "little"});
-  return true;
+       "little",
+       Severity::doubt,
+       {},
+       blurs});
 }
 
 // The exponent p for which light 0.5 + 0.5 cos (mean 1/2), raised to p, has this mean: the mean is
@@ -490,13 +559,15 @@ std::vector<Fault> capture_faults(const Observed& observed) {
     note_between(seen, &faults);
     const bool unsteady = note_exposure(seen, &faults);
     note_motion(seen, &faults);
-    const bool blurred = note_defocus(seen, &faults);
+    note_shake(seen, &faults);
+    if (!unsteady) note_flicker(seen, &faults);
+    note_defocus(seen, &faults);
     const bool bright = !unsteady && note_room_light(seen, &faults);
     const bool clipped = note_saturation(seen, &faults);
     // Light that changes, and white that is clipped, make correct waves look wrong.
     if (!unsteady && !clipped) note_gamma(seen, &faults);
-    // Unsteady light and noise make sums wrong, too, and without contrast all fine stripes look alike.
-    if (!unsteady && !bright && !blurred) note_odd_images(seen, &faults);
+    // Unsteady light and noise make sums wrong, too.
+    if (!unsteady && !bright) note_odd_images(seen, &faults);
   }
   return faults;
 }

@@ -341,6 +341,8 @@ std::vector<Fault> merged(const std::vector<Fault>& faults) {
     }
     ++further[fault.name];
     same->severity = std::max(same->severity, fault.severity);
+    same->noise_factor = std::max(same->noise_factor, fault.noise_factor);
+    same->taken_out_px = std::max(same->taken_out_px, fault.taken_out_px);
     for (const std::string& pose : fault.poses) {
       if (std::find(same->poses.begin(), same->poses.end(), pose) != same->poses.end()) continue;
       same->poses.push_back(pose);

@@ -40,10 +40,12 @@ enum class FaultName {
   repeated_pictures,
   scale_bar_not_seen,
   wrong_scale,
-  uneven_print
+  uneven_print,
+  shake,
+  flicker
 };
 /// The names in reports, which programs read; they never change.
-inline constexpr EnumNames<FaultName, 26> k_fault_names{{"board_not_visible",
+inline constexpr EnumNames<FaultName, 28> k_fault_names{{"board_not_visible",
                                                          "board_not_placed",
                                                          "few_poses",
                                                          "little_tilt",
@@ -68,7 +70,9 @@ inline constexpr EnumNames<FaultName, 26> k_fault_names{{"board_not_visible",
                                                          "repeated_pictures",
                                                          "known_length_not_seen",
                                                          "wrong_scale",
-                                                         "uneven_print"}};
+                                                         "uneven_print",
+                                                         "shake",
+                                                         "flicker"}};
 inline std::string to_text(FaultName name) { return k_fault_names.text(name); }
 
 /// Effect of a fault on the verdict.
@@ -85,6 +89,10 @@ struct Fault {
   std::string advice;
   Severity severity = Severity::doubt;
   std::vector<std::string> poses = {};  ///< names of the poses that show it; empty: it concerns all
+  /// defocus: the scatter of edges as a multiple of that in focus; other faults: 1.
+  double noise_factor = 1;
+  /// shake, flicker: what would be left in the images of every pose, camera pixels; other faults: 0.
+  double taken_out_px = 0;
 };
 
 /// The faults that captures and their solution show: those of capture_faults (calib/judge/capture_faults.h),

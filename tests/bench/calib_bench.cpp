@@ -41,6 +41,7 @@ struct Case {
   RigOptions options;
   std::optional<BadPrint> print = {};  ///< none: the print is exact
   double twist_m = 0;
+  double shake_px = 0, flicker = 0;
 };
 
 std::vector<Case> all_cases() {
@@ -65,6 +66,10 @@ std::vector<Case> all_cases() {
     }
   }
   cases.push_back({"ill-posed", {.k1 = -0.05, .shift = 0.5, .tilt = 0.05, .spread = 0.15, .seed = 4}});
+  cases.push_back({.name = "shaken",
+                   .options = {.k1 = -0.05, .shift = 0.5, .seed = 2},
+                   .shake_px = 0.2,
+                   .flicker = 0.015});
   return cases;
 }
 
@@ -110,22 +115,25 @@ sim::Object bowed_board(const TrueRig& truth,
   return object;
 }
 
-sim::World world_of(const TrueRig& truth) {
+sim::World world_of(const Case& test_case, const TrueRig& truth) {
   sim::World world;
   world.rig = truth.rig;
-  world.camera_effects = {{.exposure = 0.9, .psf_px = 0.6, .read_noise = 2, .black_level = 4}};
+  world.camera_effects = {{.exposure = 0.9,
+                           .psf_px = 0.6,
+                           .read_noise = 2,
+                           .black_level = 4,
+                           .shake_px = test_case.shake_px,
+                           .flicker = test_case.flicker}};
   world.projector_effects = {
       {.illuminance_at_1m = 1.7, .gamma = 2.2, .black_level = 0.002, .focus_m = 1.3, .aperture_m = 0.01}};
   world.room.ambient = 0.05;
   return world;
 }
 
-Result<calib::CaptureSet> captured(const TrueRig& truth,
-                                   const std::optional<BadPrint>& print,
-                                   const fs::path& folder) {
+Result<calib::CaptureSet> captured(const Case& test_case, const TrueRig& truth, const fs::path& folder) {
   if (fs::exists(folder / "complete")) return calib::load_captures(folder);
   fs::remove_all(folder);
-  sim::World world = world_of(truth);
+  sim::World world = world_of(test_case, truth);
   const Imager &camera = truth.rig.cameras[0], &projector = truth.rig.projectors[0];
   const calib::CaptureSet plan =
       calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
@@ -133,7 +141,7 @@ Result<calib::CaptureSet> captured(const TrueRig& truth,
   LIMN_TRY_STATUS(calib::begin_captures(plan));
   std::uint64_t seed = 1;
   for (size_t pose = 0; pose < truth.world_from_board.size(); ++pose) {
-    world.objects = {bowed_board(truth, print, truth.world_from_board[pose])};
+    world.objects = {bowed_board(truth, test_case.print, truth.world_from_board[pose])};
     const sim::Samples samples = sim::trace(world, 0);
     cv::Mat shown;
     const calib::CaptureBackend backend{.show = [&](int, const cv::Mat& image) -> Status {
@@ -379,7 +387,7 @@ void print_rows(const std::string& name, const TrueRig& truth, const Rig& rig, d
 Status run_paper(const Case& test_case, const fs::path& folder) {
   TrueRig truth = make_true_rig(test_case.options);
   truth.twist_m = test_case.twist_m;
-  LIMN_TRY(const calib::CaptureSet captures, captured(truth, test_case.print, folder / test_case.name));
+  LIMN_TRY(const calib::CaptureSet captures, captured(test_case, truth, folder / test_case.name));
   fmt::print("{}\n", test_case.name);
   std::mt19937_64 rng(test_case.options.seed);
   const Vector2d lengths = 1e3 * test_case.print->lengths(truth.board);
@@ -409,7 +417,7 @@ Status run_case(const Case& test_case, const fs::path& folder) {
   const auto seconds = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   };
-  LIMN_TRY(const calib::CaptureSet captures, captured(truth, {}, folder / test_case.name));
+  LIMN_TRY(const calib::CaptureSet captures, captured(test_case, truth, folder / test_case.name));
   fmt::print("{}: captured {:.0f} s\n", test_case.name, seconds());
   const double begun_solving = seconds();
   LIMN_TRY(const calib::Observed observed, calib::observe(captures));

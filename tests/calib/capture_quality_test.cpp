@@ -89,6 +89,55 @@ TEST(CaptureQuality, NamesImagesThatAreRepeatedOrSwapped) {
   EXPECT_EQ(quality.odd[0].file, "025.png");
 }
 
+// Half of the light, as a camera with the sRGB curve shows it, is much brighter than half of white.
+void encode_srgb(cv::Mat* light) {
+  for (int y = 0; y < light->rows; ++y) {
+    for (int x = 0; x < light->cols; ++x) {
+      double& value = light->at<double>(y, x);
+      value = value <= 0.0031308 ? 12.92 * value : 1.055 * std::pow(value, 1 / 2.4) - 0.055;
+    }
+  }
+}
+
+// A series of which the camera resolves some pairs and not others.
+CodeBench blurred_bench(double blur, bool is_srgb) {
+  CodeBench bench = bench_with_blobs();
+  bench.patterns = Patterns::create(PatternCode::gray, 256, 256).value();
+  bench.blur = blur;
+  bench.changed = [is_srgb](int, cv::Mat* light) {
+    print_blobs(light, 0);
+    if (is_srgb) encode_srgb(light);
+  };
+  return bench;
+}
+
+TEST(CaptureQuality, BlurredStripesAreNotRepeatedImages) {
+  for (const double blur : {0.6, 0.9, 1.2, 1.6, 2.2}) {
+    for (const bool is_srgb : {false, true}) {
+      CodeBench bench = blurred_bench(blur, is_srgb);
+      const CaptureQuality quality = quality_of(bench, bench.photographs());
+      EXPECT_TRUE(quality.odd.empty())
+          << blur << is_srgb << ": " << quality.odd.front().file << " " << quality.odd.front().finding;
+    }
+  }
+}
+
+TEST(CaptureQuality, NamesARepeatedImageInABlurredSeries) {
+  for (const bool is_srgb : {false, true}) {
+    CodeBench bench = blurred_bench(1.6, is_srgb);
+    auto photos = bench.photographs();
+    const std::vector<cv::Mat> again = bench.photographs();
+    photos[7] = again[6];    // an inverse of stripes that are resolved
+    photos[16] = again[15];  // the widest rows; the image before it is a blurred grey
+    const CaptureQuality quality = quality_of(bench, photos);
+    ASSERT_EQ(quality.odd.size(), 2U) << is_srgb;
+    EXPECT_EQ(quality.odd[0].file, "007.png");
+    EXPECT_EQ(quality.odd[0].finding, "shows the same as 006.png");
+    EXPECT_EQ(quality.odd[1].file, "016.png");
+    EXPECT_EQ(quality.odd[1].finding, "shows the same as 015.png");
+  }
+}
+
 TEST(CaptureQuality, ABoardThatOneStripeCoversInADarkNoisyRoomIsSound) {
   CodeBench bench = bench_with_blobs();
   bench.noise = 3;

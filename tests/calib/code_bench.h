@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <array>
 #include <cmath>
 #include <filesystem>
@@ -28,24 +29,26 @@ struct CodeBench {
   double noise = 0;                                 // levels
   double gamma = 1;                                 // gamma of the projector: light = value ^ gamma
   std::array<double, 3> channel_gamma = {1, 1, 1};  // multiplies it in blue, green, red; the camera is grey
+  /// Displacement of all that the camera sees in image number `index`, camera pixels; none by default.
+  std::function<Eigen::Vector2d(int index)> shift_px;
   /// May change the light of image number `index` as the camera sees it, 0 to 1, before it is photographed.
   std::function<void(int index, cv::Mat* light)> changed;
   std::mt19937_64 rng = test_rng();
 
   // Position in the projector's image of the centre of a camera pixel.
-  double column_at(int x) const { return 5.3 + 0.35 * x; }
-  double row_at(int y) const { return 3.1 + 0.4 * y; }
+  double column_at(double x) const { return 5.3 + 0.35 * x; }
+  double row_at(double y) const { return 3.1 + 0.4 * y; }
 
   /// Light at the camera pixels: the image's pixels are squares, blurred. CV_64F.
-  cv::Mat light(const cv::Mat& image) const {
+  cv::Mat light(const cv::Mat& image, const Eigen::Vector2d& shift = Eigen::Vector2d::Zero()) const {
     cv::Mat linear(image.size(), CV_64F);
     for (int y = 0; y < image.rows; ++y) {
       for (int x = 0; x < image.cols; ++x)
         linear.at<double>(y, x) =
             (light_of(image, y, x, 0) + light_of(image, y, x, 1) + light_of(image, y, x, 2)) / 3;
     }
-    const auto columns = weights(width, image.cols, [&](int x) { return column_at(x); });
-    const auto rows = weights(height, image.rows, [&](int y) { return row_at(y); });
+    const auto columns = weights(width, image.cols, [&](int x) { return column_at(x - shift.x()); });
+    const auto rows = weights(height, image.rows, [&](int y) { return row_at(y - shift.y()); });
     return rows * linear * columns.t();
   }
 
@@ -54,7 +57,7 @@ struct CodeBench {
     std::normal_distribution<double> scatter(0, 1);
     std::vector<cv::Mat> photos;
     for (int i = 0; i < patterns.count(); ++i) {
-      cv::Mat seen = light(patterns.image(i));
+      cv::Mat seen = light(patterns.image(i), shift_px ? shift_px(i) : Eigen::Vector2d(0, 0));
       if (changed) changed(i, &seen);
       cv::Mat photo(height, width, CV_8U);
       for (int y = 0; y < height; ++y) {

@@ -256,6 +256,50 @@ TEST(Faults, OneImageIsTheOneBefore) {
       << to_text(diagnosis.faults);
 }
 
+// Blur takes the contrast of the finest stripes only; an image of wide stripes that is repeated is still
+// seen.
+TEST(Faults, OneImageOfABlurredSeriesIsTheOneBefore) {
+  FaultBench late = bench();
+  late.world.camera_effects[0].psf_px = 1.8;
+  cv::Mat last;
+  int pose_now = -1, shot_now = -1;
+  late.before_shot = [&](int pose, int shot, sim::World*) { pose_now = pose, shot_now = shot; };
+  late.on_photo = [&](const cv::Mat& photo) {
+    const bool repeated = pose_now == 2 && shot_now == 9;
+    if (!repeated) last = photo.clone();
+    return last.clone();
+  };
+  const Diagnosis diagnosis = diagnosis_of(late, "one picture repeated, camera out of focus");
+  EXPECT_TRUE(diagnosis.names.count("defocus")) << to_text(diagnosis.faults);
+  expect_named(diagnosis, "repeated_pictures", {"defocus", "low_decode", "odd_pose"});
+  EXPECT_NE(to_text(diagnosis.faults).find("009.png"), std::string::npos) << to_text(diagnosis.faults);
+}
+
+// What an sRGB camera shows of blurred stripes does not add up to white and black.
+TEST(Faults, BlurInACameraThatIsNotLinearIsDefocusAlone) {
+  FaultBench blurred = bench();
+  blurred.world.camera_effects[0].psf_px = 1.8;
+  blurred.world.camera_effects[0].srgb = true;
+  const Diagnosis diagnosis = diagnosis_of(blurred, "camera out of focus, sRGB");
+  EXPECT_FALSE(diagnosis.names.count("repeated_pictures")) << to_text(diagnosis.faults);
+}
+
+// Both are measured and taken out; one note each says what they would have cost.
+TEST(Faults, ACameraThatShakesInFlickeringLightIsGoodAndSaysSo) {
+  FaultBench shaken = bench();
+  shaken.world.camera_effects[0].shake_px = 0.15;
+  shaken.world.camera_effects[0].flicker = 0.015;
+  const Diagnosis diagnosis = diagnosis_of(shaken, "shake of 0.15 px and flicker of 1.5 %");
+  EXPECT_EQ(diagnosis.names, Names({"shake", "flicker"})) << to_text(diagnosis.faults);
+  EXPECT_EQ(diagnosis.verdict, "good");
+  ASSERT_EQ(diagnosis.faults.size(), 2U) << to_text(diagnosis.faults);
+  for (const Fault& fault : diagnosis.faults) {
+    EXPECT_EQ(fault.severity, Severity::note);
+    EXPECT_EQ(fault.poses.size(), static_cast<size_t>(k_poses));
+    EXPECT_NE(fault.evidence.find("left in, it would cost about"), std::string::npos) << fault.evidence;
+  }
+}
+
 TEST(Faults, BoardMovedDuringACapture) {
   FaultBench moved = bench();
   moved.nudge = Nudge{2, 20, false, Pose(Eigen::Quaterniond::Identity(), {0.002, 0, 0.001})};

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
@@ -165,6 +166,42 @@ TEST(Photograph, ExposureScalesAndPsfKeepsEnergy) {
     for (int c = 0; c < 320; ++c)
       second += static_cast<double>(blurred.at<float>(r, c)) * (c - 150) * (c - 150);
   EXPECT_NEAR(std::sqrt(second / 3.5), 1.3, 0.01);
+}
+
+TEST(Photograph, AShakingCameraDisplacesEachFrameAsStated) {
+  sim::World world = small_world();
+  world.camera_effects[0].shake_px = 0.2;
+  cv::Mat light = cv::Mat::zeros(240, 320, CV_32F);
+  light.at<float>(100, 150) = 7;
+  for (const double psf_px : {0.0, 0.7}) {
+    world.camera_effects[0].psf_px = psf_px;
+    double squared = 0;
+    constexpr int k_frames = 60;
+    for (std::uint64_t seed = 0; seed < k_frames; ++seed) {
+      const sim::Disturbance shaken = sim::disturbance(world, 0, seed);
+      const cv::Mat signal = sim::exposed(world, 0, light, shaken);
+      const cv::Moments moments = cv::moments(signal);
+      EXPECT_NEAR(moments.m00, 7, 1e-3);
+      EXPECT_NEAR(moments.m10 / moments.m00, 150 + shaken.shift_px.x(), 2e-3);
+      EXPECT_NEAR(moments.m01 / moments.m00, 100 + shaken.shift_px.y(), 2e-3);
+      squared += shaken.shift_px.squaredNorm() / (2 * k_frames);
+    }
+    EXPECT_NEAR(std::sqrt(squared), 0.2, 0.04);
+  }
+}
+
+TEST(Photograph, FlickerScalesEachFrameAsStated) {
+  sim::World world = small_world();
+  world.camera_effects[0].flicker = 0.015;
+  double squared = 0;
+  constexpr int k_frames = 200;
+  for (std::uint64_t seed = 0; seed < k_frames; ++seed) {
+    const sim::Disturbance lit = sim::disturbance(world, 0, seed);
+    EXPECT_EQ(lit.shift_px, Eigen::Vector2d(0, 0));
+    EXPECT_NEAR(sim::exposed(world, 0, flat_signal(0.5), lit).at<float>(5, 5), 0.5 * lit.gain, 1e-5);
+    squared += (lit.gain - 1) * (lit.gain - 1) / k_frames;
+  }
+  EXPECT_NEAR(std::sqrt(squared), 0.015, 0.003);
 }
 
 TEST(Photograph, CameraVignettingDarkensTheCornersAlone) {

@@ -71,6 +71,17 @@ TEST(World, ValuesArriveWhereTheyBelong) {
   EXPECT_EQ(world->find("box")->mesh->triangles.size(), 12U);
 }
 
+TEST(World, ShakeAndFlickerArriveAndAreOffByDefault) {
+  const auto still = loaded(k_small);
+  ASSERT_TRUE(still) << still.message();
+  EXPECT_EQ(still->camera_effects[0].shake_px, 0);
+  EXPECT_EQ(still->camera_effects[0].flicker, 0);
+  const auto shaken = loaded(replaced(k_small, "0.7}", R"(0.7, "shake_px": 0.2, "flicker": 0.015})"));
+  ASSERT_TRUE(shaken) << shaken.message();
+  EXPECT_EQ(shaken->camera_effects[0].shake_px, 0.2);
+  EXPECT_EQ(shaken->camera_effects[0].flicker, 0.015);
+}
+
 TEST(World, ColoursArriveAsBlueGreenRed) {
   std::string text = k_small;
   text.replace(text.find(R"("exposure")"), 0,
@@ -121,6 +132,8 @@ TEST(World, BadFilesAreErrorsThatNameThePlace) {
   const std::pair<std::string, std::string> cases[] = {
       {replaced(k_small, "\"psf_px\"", "\"psf\""), "cameras[0]"},
       {replaced(k_small, "0.7}", "-0.7}"), "cameras[0].psf_px"},
+      {replaced(k_small, "0.7}", "0.7, \"shake_px\": -0.2}"), "cameras[0].shake_px"},
+      {replaced(k_small, "0.7}", "0.7, \"flicker\": 1.5}"), "cameras[0].flicker"},
       {replaced(k_small, "[320, 240]", "[320.5, 240]"), "cameras[0].size"},
       {replaced(k_small, "\"exposure\": 0.5", "\"exposure\": \"much\""), "cameras[0].exposure"},
       {replaced(k_small, "LENSMODEL_PINHOLE", "FISHEYE"), "cameras[0].lens"},
