@@ -20,6 +20,7 @@
 #include "session/projection_history.h"
 #include "session/screen_composer.h"
 #include "session/shadow_watch.h"
+#include "session/stillness.h"
 #include "session/viewpoint_selector.h"
 
 namespace limn::session {
@@ -84,6 +85,7 @@ class FrameComposer {
   struct Subject {
     scene::Scene scene;
     Rig rig;
+    PartBoxes part_boxes;
   };
   FrameComposer(std::unique_ptr<const Subject> subject,
                 projector::Renderer renderer,
