@@ -54,7 +54,7 @@ Result<FrameComposer> FrameComposer::create(const scene::Scene& scene,
                                             const Rig& rig,
                                             const ComposeOptions& options) {
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
-  return FrameComposer(std::unique_ptr<const Subject>(new Subject{scene, rig, PartBoxes(scene)}),
+  return FrameComposer(std::unique_ptr<const Subject>(new Subject{scene, rig, scene::PartBoxes(scene)}),
                        std::move(renderer), options);
 }
 

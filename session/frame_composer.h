@@ -10,6 +10,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 #include "projector/renderer.h"
+#include "scene/part_boxes.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 #include "session/drift_watch.h"
@@ -20,7 +21,6 @@
 #include "session/projection_history.h"
 #include "session/screen_composer.h"
 #include "session/shadow_watch.h"
-#include "session/stillness.h"
 #include "session/viewpoint_selector.h"
 
 namespace limn::session {
@@ -85,7 +85,7 @@ class FrameComposer {
   struct Subject {
     scene::Scene scene;
     Rig rig;
-    PartBoxes part_boxes;
+    scene::PartBoxes part_boxes;
   };
   FrameComposer(std::unique_ptr<const Subject> subject,
                 projector::Renderer renderer,

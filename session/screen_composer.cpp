@@ -4,6 +4,7 @@
 
 #include "core/screen_encoding.h"
 #include "session/grid_and_split.h"
+#include "session/stillness.h"
 
 namespace limn::session {
 namespace {
@@ -21,7 +22,7 @@ ScreenComposer::ScreenComposer(const scene::Scene* scene,
                                const Rig* rig,
                                const ComposeOptions& options,
                                const Eigen::AlignedBox3d& prototype_box,
-                               const PartBoxes* part_boxes)
+                               const scene::PartBoxes* part_boxes)
     : scene_(scene), rig_(rig), options_(options), prototype_box_(prototype_box), part_boxes_(part_boxes) {}
 
 cv::Mat ScreenComposer::image(const ScreenInput& input, scene::Screen what, projector::Renderer* renderer) {

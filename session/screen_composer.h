@@ -9,11 +9,11 @@
 #include "core/rig.h"
 #include "projector/composite_policy.h"
 #include "projector/renderer.h"
+#include "scene/part_boxes.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 #include "session/frame_input.h"
-#include "session/stillness.h"
 
 namespace limn::session {
 
@@ -35,7 +35,7 @@ class ScreenComposer {
                  const Rig* rig,
                  const ComposeOptions& options,
                  const Eigen::AlignedBox3d& prototype_box,
-                 const PartBoxes* part_boxes);
+                 const scene::PartBoxes* part_boxes);
 
   /// Empty before the first frame and for Screen::off.
   cv::Mat image(const ScreenInput& input, scene::Screen what, projector::Renderer* renderer);
@@ -52,7 +52,7 @@ class ScreenComposer {
   const Rig* rig_;
   ComposeOptions options_;
   Eigen::AlignedBox3d prototype_box_;
-  const PartBoxes* part_boxes_;
+  const scene::PartBoxes* part_boxes_;
   std::vector<projector::CompositePolicy> policies_;
   Stamp treated_at_;
 };

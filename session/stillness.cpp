@@ -38,20 +38,9 @@ void keep_still(const std::optional<Pose>& shown,
       track.world_from_body = *shown;
 }
 
-PartBoxes::PartBoxes(const scene::Scene& scene) {
-  for (const scene::Slot& slot : scene.slots)
-    for (const scene::Variant& variant : slot.variants) {
-      Eigen::AlignedBox3d& box = boxes_[{slot.name, variant.name}];
-      for (const Eigen::Vector3f& p : variant.mesh.positions) box.extend(p.cast<double>());
-    }
-}
-
-const Eigen::AlignedBox3d* PartBoxes::find(const std::string& slot, const std::string& variant) const {
-  const auto found = boxes_.find({slot, variant});
-  return found == boxes_.end() ? nullptr : &found->second;
-}
-
-void keep_parts_still(const scene::PosedScene& shown, const PartBoxes& boxes, scene::PosedScene* posed) {
+void keep_parts_still(const scene::PosedScene& shown,
+                      const scene::PartBoxes& boxes,
+                      scene::PosedScene* posed) {
   const auto& before = shown.world_from_prototype;
   const auto& now = posed->world_from_prototype;
   if (before.has_value() != now.has_value() || (now && !is_exactly(*before, *now))) return;

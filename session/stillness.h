@@ -1,16 +1,13 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <map>
 #include <optional>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "core/pose.h"
 #include "core/track.h"
+#include "scene/part_boxes.h"
 #include "scene/posed_scene.h"
-#include "scene/scene.h"
 
 namespace limn::session {
 
@@ -31,22 +28,12 @@ bool is_elsewhere(const Pose& before, const Pose& now);
 /// (prototype frame) would move by 0.1 mm or more.
 void keep_still(const std::optional<Pose>& shown, const Eigen::AlignedBox3d& box, std::vector<Track>* tracks);
 
-/// The bounding boxes of all variants of a scene's parts, in the parts' frames.
-class PartBoxes {
- public:
-  PartBoxes() = default;
-  explicit PartBoxes(const scene::Scene& scene);
-  /// Null: there is no such part.
-  const Eigen::AlignedBox3d* find(const std::string& slot, const std::string& variant) const;
-
- private:
-  std::map<std::pair<std::string, std::string>, Eigen::AlignedBox3d> boxes_;
-};
-
 /// Keeps parts at their last shown poses while the prototype is where it was shown and no corner of the
 /// part's box would move by 0.1 mm or more. Without this rule the images of a scene at rest were drawn again
 /// for every frame.
-void keep_parts_still(const scene::PosedScene& shown, const PartBoxes& boxes, scene::PosedScene* posed);
+void keep_parts_still(const scene::PosedScene& shown,
+                      const scene::PartBoxes& boxes,
+                      scene::PosedScene* posed);
 
 /// Moves all bodies together so that the prototype is exactly at `held`. If the prototype has really moved
 /// (is_elsewhere), its new pose is held from now on. Returns turned_from_world, the motion that was applied.

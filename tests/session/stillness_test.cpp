@@ -29,7 +29,7 @@ class PartsAtRest : public testing::Test {
   }
 
   scene::Scene scene_;
-  PartBoxes boxes_;
+  scene::PartBoxes boxes_;
   scene::PosedScene shown_;
 };
 
