@@ -109,21 +109,19 @@ Status make_coarser(double share, VirtualSetup* loaded) {
   return scale_resolution(share, &loaded->setup.rig);
 }
 
-// The largest share of the resolution at which this machine computes at least half of all frames in time. The
-// time of a frame is measured at the smallest share, and taken to grow with the number of pixels.
-Result<double> choose_resolution(const VirtualSetup& loaded, double frame_period_s) {
-  constexpr std::array k_shares = {1.0, 0.75, 0.5, 0.4, 0.3};
-  std::vector<double> shares;
-  for (const double share : k_shares)
-    if (VirtualSetup coarser = loaded; make_coarser(share, &coarser)) shares.push_back(share);
-  const double smallest = shares.back();
+// The effort to begin with: the largest one at which this machine computes all frames in time, as far as one
+// can say from the time of a frame at the smallest resolution. It is taken to grow with the number of pixels.
+Result<std::size_t> choose_effort(const VirtualSetup& loaded, const session::RealTime& real_time) {
+  const double smallest = real_time.efforts.back().resolution;
   VirtualSetup coarser = loaded;
   LIMN_TRY_STATUS(make_coarser(smallest, &coarser));
   LIMN_TRY(const double frame_s, session::measure_frame_s(coarser.world, coarser.setup));
-  const auto is_fast = [&](double share) {
-    return frame_s * std::pow(share / smallest, 2) <= 2 * frame_period_s;
+  const auto is_fast = [&](const session::Effort& effort) {
+    return frame_s * std::pow(effort.resolution / smallest, 2) <= real_time.frame_period_s;
   };
-  return *std::find_if(shares.begin(), shares.end() - 1, is_fast);
+  const auto& efforts = real_time.efforts;
+  return static_cast<std::size_t>(std::find_if(efforts.begin(), efforts.end() - 1, is_fast) -
+                                  efforts.begin());
 }
 
 // A rig is valid only for the devices that it was measured on.
@@ -216,15 +214,6 @@ Status run_session(const LiveOptions& options,
   return output.close(&session, options.json);
 }
 
-void report_resolution(double share, session::Telemetry* telemetry) {
-  const std::string what = fmt::format(
-      "The virtual devices have {:.0f} % of their resolution, so that this machine keeps real time. "
-      "--resolution 1 keeps all of it.",
-      100 * share);
-  log_info("live: {}", what);
-  telemetry->note({}, what);
-}
-
 Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY(session::Script script, options.script.empty() ? Result<session::Script>(session::Script{})
                                                           : session::load_script(options.script));
@@ -233,13 +222,14 @@ Status play_in_virtual_room(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_fits(setup.rig, loaded.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera = !loaded.world.camera_effects.front().srgb;
-  const bool chooses = options.is_real_time && !options.resolution;
-  double share = options.resolution.value_or(1);
-  if (chooses) {
-    LIMN_TRY(share, choose_resolution(loaded, options.frame_period_s));
-  }
-  if (const Status coarser = make_coarser(share, &loaded); !coarser)
+  if (const Status coarser = make_coarser(options.resolution.value_or(1), &loaded); !coarser)
     return usage_error("--resolution: {}", coarser.message());
+  session::RealTime real_time{loaded.world.rig, options.frame_period_s,
+                              session::efforts_for(loaded.world.rig, !options.resolution)};
+  if (options.is_real_time && !options.resolution) {
+    LIMN_TRY(real_time.first, choose_effort(loaded, real_time));
+    LIMN_TRY_STATUS(make_coarser(real_time.efforts[real_time.first].resolution, &loaded));
+  }
   log_info("live: no devices are given; the session runs on a virtual rig with its own clock");
   const double end_s = options.seconds > 0  ? options.seconds
                        : script.seconds > 0 ? script.seconds
@@ -252,10 +242,8 @@ Status play_in_virtual_room(const LiveOptions& options) {
   }
   return run_session(options, setup, loaded.skipped_variants, desktop ? &*desktop : nullptr,
                      [&](const session::SessionParts& parts, session::Keys*) {
-                       if (chooses && share < 1) report_resolution(share, &parts.output.telemetry());
-                       const auto pace =
-                           options.is_real_time ? session::Pace::real_time : session::Pace::repeatable;
-                       return session::play_virtually(end_s, pace, g_is_ended, &rig, &room, parts);
+                       return session::play_virtually(end_s, options.is_real_time ? &real_time : nullptr,
+                                                      g_is_ended, &rig, &room, parts);
                      });
 }
 

@@ -103,6 +103,10 @@ WindowInput Window::input() {
 
 bool Window::is_wanted() const { return !glfwWindowShouldClose(impl_->surface.window()); }
 
+bool Window::is_minimised() const {
+  return glfwGetWindowAttrib(impl_->surface.window(), GLFW_ICONIFIED) == GLFW_TRUE;
+}
+
 float Window::scale() const {
   float x = 1, y = 1;
   glfwGetWindowContentScale(impl_->surface.window(), &x, &y);

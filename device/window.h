@@ -61,6 +61,8 @@ class Window {
   WindowInput input();
   /// False once the person has closed the window. Draws nothing.
   bool is_wanted() const;
+  /// Whether the person has minimised it: nobody can look at it.
+  bool is_minimised() const;
   /// The desktop's scale factor for the window: pixels per ordinary pixel, as the person has set it.
   float scale() const;
 

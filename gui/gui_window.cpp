@@ -62,6 +62,7 @@ std::vector<int> GuiWindow::pressed_keys() {
 }
 
 bool GuiWindow::is_due(double also_s) const {
+  if (window_.is_minimised()) return false;
   const double since_s = std::chrono::duration<double>(Clock::now() - drawn_at_).count();
   return since_s >= std::max(k_pause * (cost_s_ + also_s), is_touched_ ? k_touched_s : k_period_s);
 }

@@ -30,6 +30,7 @@ class GuiWindow {
   std::vector<int> pressed_keys();
   /// Whether to draw again: 30 times a second, sooner after a person did something, and never so often that
   /// drawing takes more than a quarter of the time. `also_s`: time of other work that is done for each image.
+  /// Never while the window is minimised.
   bool is_due(double also_s = 0) const;
   /// Draws the window; `widgets` as in Gui::frame.
   void draw(const std::function<void(Gui&)>& widgets);

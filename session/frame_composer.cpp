@@ -54,7 +54,8 @@ Result<FrameComposer> FrameComposer::create(const scene::Scene& scene,
                                             const Rig& rig,
                                             const ComposeOptions& options) {
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
-  return FrameComposer(std::unique_ptr<const Subject>(new Subject{scene, rig}), std::move(renderer), options);
+  return FrameComposer(std::unique_ptr<const Subject>(new Subject{scene, rig, scene::PartBoxes(scene)}),
+                       std::move(renderer), options);
 }
 
 FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
@@ -67,7 +68,7 @@ FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
       prototype_box_(box_of(subject_->scene)),
       viewpoints_(&subject_->scene, &subject_->rig),
       fading_(options),
-      screens_(&subject_->scene, &subject_->rig, options, prototype_box_),
+      screens_(&subject_->scene, &subject_->rig, options, prototype_box_, &subject_->part_boxes),
       shadows_(subject_->rig),
       drifts_(subject_->rig) {
   renderer_.set_quick_motion(true);
@@ -86,6 +87,7 @@ const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
   composed_.tracks = input.tracks;
   keep_still(fading_.faded().world_from_prototype, prototype_box_, &composed_.tracks);
   composed_.posed = scene::compose_scene(subject_->scene, show_state, composed_.tracks);
+  keep_parts_still(fading_.faded(), subject_->part_boxes, &composed_.posed);
   fading_.note(subject_->scene, composed_.posed, show_state, input.times.shown_at);
   select_viewpoint(input);
   if (options_.refill && subject_->rig.projectors.size() > 1)
@@ -213,7 +215,7 @@ cv::Mat FrameComposer::screen(const Percepts& percepts,
                               scene::Screen what) {
   if (percepts.frames.empty()) return {};
   ScreenInput input{percepts.frames[0], show_state, scene::assign_tracks(subject_->scene, show_state, tracks),
-                    viewpoints_.selected().viewer};
+                    viewpoints_.selected().viewer, fading_.faded()};
   keep_still(fading_.faded().world_from_prototype, prototype_box_, &input.tracks);
   return screens_.image(input, what, &renderer_);
 }

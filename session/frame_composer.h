@@ -10,6 +10,7 @@
 #include "core/result.h"
 #include "core/rig.h"
 #include "projector/renderer.h"
+#include "scene/part_boxes.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 #include "session/drift_watch.h"
@@ -84,6 +85,7 @@ class FrameComposer {
   struct Subject {
     scene::Scene scene;
     Rig rig;
+    scene::PartBoxes part_boxes;
   };
   FrameComposer(std::unique_ptr<const Subject> subject,
                 projector::Renderer renderer,

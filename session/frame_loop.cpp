@@ -1,5 +1,7 @@
 #include "session/frame_loop.h"
 
+#include <algorithm>
+
 #include "core/log.h"
 #include "core/stopwatch.h"
 
@@ -102,11 +104,17 @@ std::vector<Overlay> FrameLoop::client_overlays() {
   return out;
 }
 
-// Draws each kind of screen image once.
+// Draws each kind of screen image once, and only those that somebody looks at.
 std::map<scene::Screen, cv::Mat> FrameLoop::screen_images() {
   std::set<scene::Screen> wanted = setting_.sink.wanted_screens();
-  for (const SessionClient* client : parts_.clients)
-    if (client->wants_screen()) wanted.insert(parts_.session.show_state().screen);
+  const bool is_wanted = std::any_of(parts_.clients.begin(), parts_.clients.end(),
+                                     [](const SessionClient* client) { return client->wants_screen(); });
+  const Stamp at = now();
+  if (is_wanted &&
+      (!client_screen_at_ || seconds_between(*client_screen_at_, at) >= setting_.sink.screen_interval_s())) {
+    wanted.insert(parts_.session.show_state().screen);
+    client_screen_at_ = at;
+  }
   std::map<scene::Screen, cv::Mat> out;
   for (const scene::Screen what : wanted) out[what] = parts_.session.screen(what);
   return out;

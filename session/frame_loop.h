@@ -67,6 +67,8 @@ class FrameSink {
   /// The screen images that show_screens() needs for this frame.
   virtual std::set<scene::Screen> wanted_screens() const { return {}; }
   virtual void show_screens(const std::map<scene::Screen, cv::Mat>&) {}
+  /// The shortest time between two images of the screen that are drawn for clients.
+  virtual double screen_interval_s() const { return 0; }
   /// RMS distance of the parts from their true positions, mm; -1: unknown.
   virtual double placement_mm(const ComposedFrame&) const { return -1; }
 };
@@ -101,6 +103,7 @@ class FrameLoop {
   SessionParts parts_;
   FrameSetting setting_;
   RecalibrationStage recalibration_;
+  std::optional<Stamp> client_screen_at_;  // when a screen's image was last drawn for clients
 };
 
 }  // namespace limn::session

@@ -44,7 +44,7 @@ class OperatorConsole : public SessionClient {
 
   void apply_edits(const SessionMoment&) override {}  // serve() does both
   void publish_state(const SessionMoment& moment) override;
-  bool wants_screen() const override { return is_due(); }
+  bool wants_screen() const override { return panel_.shows_screen() && is_due(); }
   bool ends_session() const override { return ends_session_; }
 
  private:

@@ -14,6 +14,8 @@ class OperatorPanel {
  public:
   /// To be called within a frame of `gui`.
   OperatorAsked draw(gui::Gui& gui, const OperatorView& view);
+  /// Whether it shows the screen's image: it does not while the remote's codes take its place.
+  bool shows_screen() const { return !shows_remote_; }
   /// Opens the question whether to end the session; called again, closes it.
   void ask_to_end() { asks_to_end_ = !asks_to_end_; }
 

@@ -4,6 +4,7 @@
 
 #include "core/screen_encoding.h"
 #include "session/grid_and_split.h"
+#include "session/stillness.h"
 
 namespace limn::session {
 namespace {
@@ -20,8 +21,9 @@ Imager moved_eye(Imager imager, double right_m) {
 ScreenComposer::ScreenComposer(const scene::Scene* scene,
                                const Rig* rig,
                                const ComposeOptions& options,
-                               const Eigen::AlignedBox3d& prototype_box)
-    : scene_(scene), rig_(rig), options_(options), prototype_box_(prototype_box) {}
+                               const Eigen::AlignedBox3d& prototype_box,
+                               const scene::PartBoxes* part_boxes)
+    : scene_(scene), rig_(rig), options_(options), prototype_box_(prototype_box), part_boxes_(part_boxes) {}
 
 cv::Mat ScreenComposer::image(const ScreenInput& input, scene::Screen what, projector::Renderer* renderer) {
   using enum scene::Screen;
@@ -29,7 +31,8 @@ cv::Mat ScreenComposer::image(const ScreenInput& input, scene::Screen what, proj
   const cv::Mat behind = options_.is_linear_camera ? srgb_image(input.frame.image) : input.frame.image;
   if (what == camera) return behind;
   const Stamp at = input.frame.captured_at;
-  const scene::PosedScene posed = scene::compose_scene(*scene_, input.show_state, input.tracks);
+  scene::PosedScene posed = scene::compose_scene(*scene_, input.show_state, input.tracks);
+  keep_parts_still(input.shown, *part_boxes_, &posed);
   if (what == rest) {
     const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
     policies_ = projector::updated_policies(policies_, renderer->coverage(posed, rig_->cameras[0]), seconds);

@@ -9,6 +9,7 @@
 #include "core/rig.h"
 #include "projector/composite_policy.h"
 #include "projector/renderer.h"
+#include "scene/part_boxes.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
@@ -22,17 +23,19 @@ struct ScreenInput {
   const scene::ShowState& show_state;
   std::vector<Track> tracks;  ///< at that frame's stamp, assigned to slots as the show state pairs markers
   const Imager& viewer;       ///< viewpoint that `view` parts are drawn for; width 0: camera 0's
+  const scene::PosedScene& shown;  ///< the scene as it is projected; parts at rest are drawn at its poses
 };
 
 /// Composes images for screens that stand beside the prototype. Remembers the last composite policies, so
 /// that parts do not flicker.
 class ScreenComposer {
  public:
-  /// Borrows scene and rig. `prototype_box`: in the prototype's frame.
+  /// Borrows scene, rig and boxes. `prototype_box`: in the prototype's frame.
   ScreenComposer(const scene::Scene* scene,
                  const Rig* rig,
                  const ComposeOptions& options,
-                 const Eigen::AlignedBox3d& prototype_box);
+                 const Eigen::AlignedBox3d& prototype_box,
+                 const scene::PartBoxes* part_boxes);
 
   /// Empty before the first frame and for Screen::off.
   cv::Mat image(const ScreenInput& input, scene::Screen what, projector::Renderer* renderer);
@@ -49,6 +52,7 @@ class ScreenComposer {
   const Rig* rig_;
   ComposeOptions options_;
   Eigen::AlignedBox3d prototype_box_;
+  const scene::PartBoxes* part_boxes_;
   std::vector<projector::CompositePolicy> policies_;
   Stamp treated_at_;
 };

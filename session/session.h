@@ -79,6 +79,9 @@ class Session {
   const RecalibrationStatus& recalibration() const { return recalibration_; }
   /// The drift that was last reported.
   const std::optional<Drift>& drift() const { return drift_.reported(); }
+  /// What the session leaves out to keep real time, as a sentence for people; empty: nothing.
+  const std::string& pace() const { return pace_; }
+  void set_pace(std::string sentence) { pace_ = std::move(sentence); }
   /// Adds a message to the telemetry and to the log.
   void warn(Stamp at, const std::string& what);
 
@@ -145,6 +148,7 @@ class Session {
   DriftNotices drift_;
   SwappedCamerasCheck swapped_;
   RecalibrationStatus recalibration_;
+  std::string pace_;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;
   TabletRegistry tablets_;

@@ -8,6 +8,20 @@ namespace {
 constexpr double k_trembles_m = 0.5e-3, k_trembles_rad = 1e-3;
 constexpr double k_stays_m = 0.1e-3;  // an eighth of a projector pixel at 1280 pixels per metre
 
+// Whether no corner of the box moves noticeably between the two poses.
+bool stays(const Eigen::AlignedBox3d& box, const Pose& before, const Pose& now) {
+  double most_m = 0;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d p = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
+    most_m = std::max(most_m, (now * p - before * p).norm());
+  }
+  return most_m < k_stays_m;
+}
+
+bool is_exactly(const Pose& a, const Pose& b) {
+  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
+}
+
 }  // namespace
 
 bool is_elsewhere(const Pose& before, const Pose& now) {
@@ -19,14 +33,24 @@ void keep_still(const std::optional<Pose>& shown,
                 const Eigen::AlignedBox3d& box,
                 std::vector<Track>* tracks) {
   if (!shown || box.isEmpty()) return;
-  for (Track& track : *tracks) {
-    if (track.body != "prototype") continue;
-    double most_m = 0;
-    for (int i = 0; i < 8; ++i) {
-      const Eigen::Vector3d p = box.corner(static_cast<Eigen::AlignedBox3d::CornerType>(i));
-      most_m = std::max(most_m, (track.world_from_body * p - *shown * p).norm());
-    }
-    if (most_m < k_stays_m) track.world_from_body = *shown;
+  for (Track& track : *tracks)
+    if (track.body == "prototype" && stays(box, *shown, track.world_from_body))
+      track.world_from_body = *shown;
+}
+
+void keep_parts_still(const scene::PosedScene& shown,
+                      const scene::PartBoxes& boxes,
+                      scene::PosedScene* posed) {
+  const auto& before = shown.world_from_prototype;
+  const auto& now = posed->world_from_prototype;
+  if (before.has_value() != now.has_value() || (now && !is_exactly(*before, *now))) return;
+  for (scene::PosedPart& part : posed->parts) {
+    const auto was = std::find_if(shown.parts.begin(), shown.parts.end(), [&](const scene::PosedPart& other) {
+      return other.slot == part.slot && other.variant == part.variant;
+    });
+    const Eigen::AlignedBox3d* box = boxes.find(part.slot, part.variant);
+    if (was == shown.parts.end() || !box || box->isEmpty()) continue;
+    if (stays(*box, was->world_from_part, part.world_from_part)) part.world_from_part = was->world_from_part;
   }
 }
 

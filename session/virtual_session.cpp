@@ -5,9 +5,12 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "core/log.h"
+#include "core/names.h"
+#include "core/scale_resolution.h"
 #include "core/stopwatch.h"
 #include "device/gl_context.h"
 #include "session/frame_gate.h"
@@ -67,18 +70,25 @@ class VirtualClock final : public FrameClock {
 };
 
 // Makes the rig's clock follow the wall clock from the first call on.
-class RealTime {
+class WallPace {
  public:
-  void keep(sim::VirtualRig* rig) {
+  // Returns how long the caller was busy since the last call; nullopt at the first call.
+  std::optional<double> keep(sim::VirtualRig* rig) {
+    using Seconds = std::chrono::duration<double>;
     const auto now = std::chrono::steady_clock::now();
+    std::optional<double> busy_s;
+    if (kept_at_) busy_s = Seconds(now - *kept_at_).count();
     if (!begun_) begun_ = Begin{now, rig->now()};
-    const double ahead_s = seconds_between(begun_->clock, rig->now()) -
-                           std::chrono::duration<double>(now - begun_->wall).count();
+    const double ahead_s = seconds_between(begun_->clock, rig->now()) - Seconds(now - begun_->wall).count();
     if (ahead_s > 0)
-      std::this_thread::sleep_for(std::chrono::duration<double>(ahead_s));
+      std::this_thread::sleep_for(Seconds(ahead_s));
     else
       rig->advance(-ahead_s);
+    kept_at_ = std::chrono::steady_clock::now();
+    return busy_s;
   }
+  // The time until the next call does not count.
+  void forget() { kept_at_.reset(); }
 
  private:
   struct Begin {
@@ -86,30 +96,120 @@ class RealTime {
     Stamp clock;
   };
   std::optional<Begin> begun_;
+  std::optional<std::chrono::steady_clock::time_point> kept_at_;
+};
+
+// The rig with the image sizes of `sizes`, which has the same devices.
+Rig with_sizes(Rig rig, const Rig& sizes) {
+  const auto resize = [](const std::vector<Imager>& from, std::vector<Imager>* to) {
+    for (Imager& imager : *to) {
+      const Imager* size = find_named(from, imager.name);
+      const auto changed = size ? resized(imager, size->width, size->height) : std::nullopt;
+      LIMN_CHECK(changed.has_value());
+      imager = *changed;
+    }
+  };
+  resize(sizes.cameras, &rig.cameras);
+  resize(sizes.projectors, &rig.projectors);
+  return rig;
+}
+
+// Keeps real time: follows the wall clock and chooses the effort.
+class EffortControl {
+ public:
+  EffortControl(const RealTime& real_time, sim::VirtualRig* rig, const SessionParts& parts)
+      : real_time_(real_time),
+        control_(costs_of(real_time.efforts), real_time.frame_period_s, real_time.first),
+        rig_(rig),
+        parts_(parts) {
+    rig_->set_trace_effort(effort().trace);
+    report();
+  }
+
+  const Effort& effort() const { return real_time_.efforts[control_.chosen()]; }
+  // To be called before each frame. True: the images have another size from now on.
+  bool keep() {
+    const auto busy_s = pace_.keep(rig_);
+    if (parts_.session.show_state().frozen) control_.forget_frames();
+    const Effort before = effort();
+    if (is_ended_ || !busy_s || !control_.add_frame(*busy_s)) return false;
+    const Status changed = apply(before);
+    if (!changed) {
+      is_ended_ = true;
+      parts_.session.warn(rig_->now(), changed.message());
+    }
+    pace_.forget();  // the change itself is no frame
+    report();
+    return changed.ok() && before.resolution != effort().resolution;
+  }
+  void forget() {
+    pace_.forget();
+    control_.forget_frames();
+  }
+
+ private:
+  static std::vector<double> costs_of(std::span<const Effort> efforts) {
+    std::vector<double> costs;
+    for (const Effort& effort : efforts) costs.push_back(guessed_cost(effort));
+    return costs;
+  }
+
+  Status apply(const Effort& before) {
+    rig_->set_trace_effort(effort().trace);
+    if (effort().resolution == before.resolution) return {};
+    Rig sized = real_time_.whole;
+    LIMN_TRY_STATUS(scale_resolution(effort().resolution, &sized));
+    Session& session = parts_.session;
+    LIMN_TRY_STATUS(session.replace_rig(with_sizes(session.setup().rig, sized), rig_->now()));
+    const SessionSetup& setup = session.setup();
+    LIMN_TRY(parts_.perception, Perception::create(setup.scene, setup.rig, setup.watch));
+    rig_->resize(with_sizes(rig_->world().rig, sized));
+    return {};
+  }
+
+  void report() {
+    const std::string what = sentence(effort());
+    if (what == parts_.session.pace()) return;
+    const std::string note = what.empty() ? "This machine keeps real time at the whole resolution." : what;
+    parts_.session.set_pace(what);
+    parts_.output.telemetry().note(rig_->now(), note);
+    log_info("live: {}", note);
+  }
+
+  const RealTime& real_time_;
+  PaceControl control_;
+  WallPace pace_;
+  sim::VirtualRig* rig_;
+  SessionParts parts_;
+  bool is_ended_ = false;  // after a change that failed
 };
 
 // Each perception uses the room's next exposure; edits come from the script.
 class VirtualSource final : public FrameSource {
  public:
   VirtualSource(double end_s,
-                Pace pace,
+                EffortControl* control,
                 sim::VirtualRig* rig,
                 ScriptedRoom* room,
                 Perception* perception,
                 Recorder* recorder,
                 DeviceHealth* health)
-      : end_s_(end_s), rig_(rig), room_(room), perception_(perception), recorder_(recorder), health_(health) {
-    if (pace == Pace::real_time) real_time_.emplace();
-    for (const Imager& camera : rig->world().rig.cameras) {
+      : end_s_(end_s),
+        control_(control),
+        rig_(rig),
+        room_(room),
+        perception_(perception),
+        recorder_(recorder),
+        health_(health) {
+    for (const Imager& camera : rig->world().rig.cameras)
       cameras_.push_back(health->add({camera.name, "camera"}));
-      gates_.emplace_back(camera.name, cv::Size(camera.width, camera.height), cameras_.back(), health);
-    }
+    make_gates();
   }
 
   bool is_over() const override { return !is_paused_ && seconds_of(rig_->next_exposure()) > end_s_; }
 
   Result<Perceived> perceive() override {
-    if (real_time_) real_time_->keep(rig_);
+    if (control_ && control_->keep()) make_gates();
     exposed_at_ = rig_->next_exposure();
     room_->set(seconds_of(exposed_at_));
     const std::vector<Frame> frames = exposed();
@@ -134,9 +234,20 @@ class VirtualSource final : public FrameSource {
   }
 
   // While it is paused the session is not over, whatever the time.
-  void pause(bool is_paused) { is_paused_ = is_paused; }
+  void pause(bool is_paused) {
+    is_paused_ = is_paused;
+    if (control_) control_->forget();
+  }
 
  private:
+  void make_gates() {
+    gates_.clear();
+    const std::vector<Imager>& cameras = rig_->world().rig.cameras;
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      gates_.emplace_back(cameras[i].name, cv::Size(cameras[i].width, cameras[i].height), cameras_[i],
+                          health_);
+  }
+
   // The accepted frames of this moment.
   std::vector<Frame> exposed() {
     std::vector<int> plugged;
@@ -156,6 +267,7 @@ class VirtualSource final : public FrameSource {
   }
 
   double end_s_;
+  EffortControl* control_;  // null: no real time
   sim::VirtualRig* rig_;
   ScriptedRoom* room_;
   Perception* perception_;
@@ -163,7 +275,6 @@ class VirtualSource final : public FrameSource {
   DeviceHealth* health_;
   std::vector<std::size_t> cameras_;  // in health_
   std::vector<FrameGate> gates_;      // one per entry of cameras_
-  std::optional<RealTime> real_time_;
   Stamp exposed_at_;
   std::size_t moments_ = 0, edited_ = 0;
   bool is_paused_ = false;
@@ -172,8 +283,12 @@ class VirtualSource final : public FrameSource {
 // The virtual projectors; the script may unplug some of them.
 class VirtualSink final : public FrameSink {
  public:
-  VirtualSink(sim::VirtualRig* rig, const ScriptedRoom* room, const Session* session, DeviceHealth* health)
-      : rig_(rig), room_(room), session_(session), health_(health) {
+  VirtualSink(sim::VirtualRig* rig,
+              const ScriptedRoom* room,
+              const Session* session,
+              DeviceHealth* health,
+              const EffortControl* control)
+      : rig_(rig), room_(room), session_(session), health_(health), control_(control) {
     for (const Imager& projector : session->setup().rig.projectors)
       projectors_.push_back(health->add({projector.name, "projector"}));
   }
@@ -186,6 +301,8 @@ class VirtualSink final : public FrameSink {
     }
     return {};
   }
+
+  double screen_interval_s() const override { return control_ ? control_->effort().screen_interval_s : 0; }
 
   double placement_mm(const ComposedFrame& composed) const override {
     return session::placement_mm(composed, *session_, *room_, rig_->world());
@@ -203,6 +320,7 @@ class VirtualSink final : public FrameSink {
   const ScriptedRoom* room_;
   const Session* session_;
   DeviceHealth* health_;
+  const EffortControl* control_;         // null: no real time
   std::vector<std::size_t> projectors_;  // in health_
 };
 
@@ -230,7 +348,7 @@ class VirtualCapture final : public CaptureDevices {
 
 // Runs the loop; `each_frame` is called after every frame.
 Status play(double end_s,
-            Pace pace,
+            const RealTime* real_time,
             const std::atomic<bool>& is_ended,
             sim::VirtualRig* rig,
             ScriptedRoom* room,
@@ -238,8 +356,11 @@ Status play(double end_s,
             const std::function<void()>& each_frame) {
   DeviceHealth health;
   VirtualClock clock(rig);
-  VirtualSource source(end_s, pace, rig, room, &parts.perception, parts.output.recorder(), &health);
-  VirtualSink sink(rig, room, &parts.session, &health);
+  std::optional<EffortControl> control;
+  if (real_time) control.emplace(*real_time, rig, parts);
+  EffortControl* const kept = control ? &*control : nullptr;
+  VirtualSource source(end_s, kept, rig, room, &parts.perception, parts.output.recorder(), &health);
+  VirtualSink sink(rig, room, &parts.session, &health, kept);
   VirtualCapture capture(rig, &source);
   SceneFilesClient files(parts.session.setup().scene.folder);
   SessionParts with_own = parts;
@@ -254,18 +375,19 @@ sim::VirtualRigOptions virtual_rig_options(double frame_period_s) {
   return {.display_delay_s = k_virtual_display_s,
           .camera_delay_s = k_virtual_camera_s,
           .frame_period_s = frame_period_s,
-          .grab_waits_for_light = false};
+          .grab_waits_for_light = false,
+          .follows_changes = true};
 }
 
 Status play_virtually(double end_s,
-                      Pace pace,
+                      const RealTime* real_time,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
                       ScriptedRoom* room,
                       const SessionParts& parts) {
   std::optional<Progress> progress;
   if (std::isfinite(end_s)) progress.emplace("live", static_cast<int>(std::ceil(end_s)));
-  return play(end_s, pace, is_ended, rig, room, parts, [&] {
+  return play(end_s, real_time, is_ended, rig, room, parts, [&] {
     if (progress) progress->step(static_cast<int>(seconds_of(rig->now())));
   });
 }
@@ -282,7 +404,7 @@ Result<double> measure_frame_s(const sim::World& world, SessionSetup setup) {
   const SessionParts parts{perception, session, output, {}};
   const std::atomic<bool> is_ended = false;
   const auto play_until = [&](double end_s) {
-    return play(end_s, Pace::repeatable, is_ended, &rig, &room, parts, [] {});
+    return play(end_s, nullptr, is_ended, &rig, &room, parts, [] {});
   };
   LIMN_TRY_STATUS(play_until(k_frames * k_period_s));
   const Stamp from = rig.now();

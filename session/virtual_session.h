@@ -1,9 +1,11 @@
 #pragma once
 
 #include <atomic>
+#include <vector>
 
 #include "core/result.h"
 #include "session/frame_loop.h"
+#include "session/pace_control.h"
 #include "session/script.h"
 #include "sim/virtual_rig.h"
 
@@ -13,19 +15,22 @@ namespace limn::session {
 /// it.
 constexpr double k_virtual_camera_s = 0.020, k_virtual_display_s = 0.040;
 
-/// How the virtual rig's clock runs.
-enum class Pace {
-  repeatable,  ///< From frame to frame, as fast as the machine can: nothing sleeps, and every run is the
-               ///< same.
-  real_time,   ///< As a clock on the wall. A slow machine leaves frames out, a fast one waits.
+/// A session whose clock runs as a clock on the wall. A slow machine leaves frames out and lowers its effort,
+/// a fast one waits.
+struct RealTime {
+  Rig whole;  ///< the virtual rig with its whole resolution
+  double frame_period_s = 1 / 30.0;
+  std::vector<Effort> efforts;  ///< that may be chosen (efforts_for)
+  std::size_t first = 0;        ///< the index of the one with which the session begins
 };
 
 sim::VirtualRigOptions virtual_rig_options(double frame_period_s);
 
 /// Runs a session on a virtual rig, on its clock. Each frame is made of one exposure. Ends at `end_s` of the
-/// clock, when `is_ended` is set, or when a client ends it.
+/// clock, when `is_ended` is set, or when a client ends it. `real_time`: null, and the clock goes from frame
+/// to frame as fast as the machine can: nothing sleeps, and every run is the same.
 Status play_virtually(double end_s,
-                      Pace pace,
+                      const RealTime* real_time,
                       const std::atomic<bool>& is_ended,
                       sim::VirtualRig* rig,
                       ScriptedRoom* room,

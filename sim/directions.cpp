@@ -1,5 +1,6 @@
 #include "sim/directions.h"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -49,7 +50,9 @@ void Directions::row(double x0, double y, std::span<Eigen::Vector3f> d) const {
   const int r = static_cast<int>(cy);
   const std::array<double, 4> wy = weights(cy - r);
   std::vector<Eigen::Vector3d> knots(static_cast<std::size_t>(columns_), Eigen::Vector3d::Zero());
-  for (int c = 0; c < columns_; ++c)
+  const int first = static_cast<int>(x0 / k_direction_step + 2) - 1;
+  const int last = static_cast<int>((x0 + static_cast<double>(d.size())) / k_direction_step + 2) + 2;
+  for (int c = std::max(0, first); c <= std::min(columns_ - 1, last); ++c)
     for (int j = 0; j < 4; ++j)
       knots[static_cast<std::size_t>(c)] += wy[static_cast<std::size_t>(j)] * knots_[index(r - 1 + j, c)];
   for (std::size_t i = 0; i < d.size(); ++i) {

@@ -36,6 +36,15 @@ struct Placed {
   Pose world_from_mesh;
   std::vector<Eigen::Vector3f>
       positions;  // in the world frame; shared with Embree, which may read 4 bytes past the end
+
+  void place(const Pose& pose) {
+    world_from_mesh = pose;
+    positions.clear();
+    positions.reserve(mesh->positions.size() + 1);
+    for (const Eigen::Vector3f& p : mesh->positions)
+      positions.push_back((world_from_mesh * p.cast<double>()).cast<float>());
+    positions.push_back(Eigen::Vector3f::Zero());
+  }
 };
 
 RTCGeometry geometry_of(RTCDevice device, Placed& placed) {
@@ -90,23 +99,30 @@ struct RayScene::Impl {
   }
 };
 
-RayScene::RayScene(std::span<const MeshInstance> meshes) : impl_(std::make_unique<Impl>()) {
+RayScene::RayScene(std::span<const MeshInstance> meshes, bool moves) : impl_(std::make_unique<Impl>()) {
   impl_->device = rtcNewDevice("threads=2");
   LIMN_CHECK(impl_->device != nullptr);
   impl_->scene = rtcNewScene(impl_->device);
-  rtcSetSceneFlags(impl_->scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(impl_->scene,
+                   moves ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_ROBUST);
   impl_->placed.resize(meshes.size());
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     Placed& placed = impl_->placed[i];
     placed.mesh = meshes[i].mesh;
-    placed.world_from_mesh = meshes[i].world_from_mesh;
-    placed.positions.reserve(placed.mesh->positions.size() + 1);
-    for (const Eigen::Vector3f& p : placed.mesh->positions)
-      placed.positions.push_back((placed.world_from_mesh * p.cast<double>()).cast<float>());
-    placed.positions.push_back(Eigen::Vector3f::Zero());
+    placed.place(meshes[i].world_from_mesh);
     RTCGeometry geometry = geometry_of(impl_->device, placed);
     rtcAttachGeometryByID(impl_->scene, geometry, static_cast<unsigned>(i));
     rtcReleaseGeometry(geometry);
+  }
+  rtcCommitScene(impl_->scene);
+}
+
+void RayScene::move(std::span<const std::size_t> meshes, std::span<const Pose> world_from_mesh) {
+  for (std::size_t k = 0; k < meshes.size(); ++k) {
+    impl_->placed[meshes[k]].place(world_from_mesh[k]);  // the memory stays where it is
+    const RTCGeometry geometry = rtcGetGeometry(impl_->scene, static_cast<unsigned>(meshes[k]));
+    rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+    rtcCommitGeometry(geometry);
   }
   rtcCommitScene(impl_->scene);
 }

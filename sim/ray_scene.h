@@ -30,10 +30,14 @@ struct Hit {
 /// Triangles in the world frame, prepared for ray queries (Embree). Queries are thread-safe.
 class RayScene {
  public:
-  explicit RayScene(std::span<const MeshInstance> meshes);
+  /// `moves`: move() will be called; queries then take a little longer.
+  explicit RayScene(std::span<const MeshInstance> meshes, bool moves = false);
   ~RayScene();
   RayScene(RayScene&&) noexcept;
   RayScene& operator=(RayScene&&) noexcept;
+
+  /// Moves some of the meshes, given by their indices. Only for a scene that was made for this.
+  void move(std::span<const std::size_t> meshes, std::span<const Pose> world_from_mesh);
 
   /// The first hit of a ray. The ray passes through pieces below a material's alpha cutoff. first_hits() and
   /// reached() ignore the cutoff.

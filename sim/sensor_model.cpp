@@ -1,9 +1,12 @@
 #include "sim/sensor_model.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <functional>
+#include <mutex>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
@@ -12,15 +15,18 @@
 namespace limn::sim {
 namespace {
 
-constexpr int k_grey = -1;               // stands for the channel of a grey camera
 constexpr double k_blur_step_px = 0.25;  // the defocus blur is rounded to multiples of this standard
                                          // deviation; edge spreads differ by < 1 %
 constexpr int k_blur_levels = 40;        // up to 10 px, more than is ever needed
 
-// The light of one projector in one colour channel, prepared for lookups.
+// The light of one projector, prepared for lookups: in one channel for a grey camera, else in blue, green and
+// red.
+template <int k_channels>
 class Beam {
  public:
-  Beam(const Imager& projector, const ProjectorEffects& effects, const cv::Mat& shown, int channel)
+  using Light = Eigen::Array<float, k_channels, 1>;
+
+  Beam(const Imager& projector, const ProjectorEffects& effects, const cv::Mat& shown)
       : width_(static_cast<float>(projector.width)),
         height_(static_cast<float>(projector.height)),
         effects_(effects),
@@ -29,28 +35,130 @@ class Beam {
     vignetting_ = static_cast<float>(effects.vignetting) * 4 / (width_ * width_ + height_ * height_);
     blur_levels_m_ = static_cast<float>(projector.lens.fx() * effects.aperture_m / 4 / k_blur_step_px);
     blur_at_focus_ = blur_levels_m_ / static_cast<float>(effects.focus_m);
-    if (!dark_) sharp_ = light_of(shown, channel);
+    if (!dark_) sharp_ = light_of(shown);
   }
 
-  /// Computes the blurred images that these samples need. To be called before at().
+  /// Computes the blurred images that these samples need, where they need them. To be called before at().
   void prepare(std::span<const ProjectorView> views) {
     if (dark_) return;
-    std::array<bool, k_blur_levels> used{};
-    for (const ProjectorView& view : views)
-      if (view.gain > 0) used[level_of(view.depth)] = true;
-    cv::parallel_for_({0, k_blur_levels}, [&](const cv::Range& range) {
-      for (auto level = static_cast<std::size_t>(range.start); level < static_cast<std::size_t>(range.end);
-           ++level)
-        if (used[level]) levels_[level] = blurred(level);
+    columns_ = (sharp_.cols + k_block - 1) / k_block;
+    rows_ = (sharp_.rows + k_block - 1) / k_block;
+    const std::vector<std::uint8_t> plain = plain_blocks();
+    const Blocks used = used_blocks(views);
+    std::vector<std::pair<int, cv::Rect>> work;
+    levels_[0] = sharp_;
+    for (int level = 1; level < k_blur_levels; ++level) {
+      const std::vector<std::uint8_t>& of_level = used[static_cast<std::size_t>(level)];
+      if (of_level.empty()) continue;
+      cv::Mat& blurred = levels_[static_cast<std::size_t>(level)];
+      blurred.create(sharp_.size(), sharp_.type());
+      for (std::size_t i = 0; i < of_level.size(); ++i) {
+        if (of_level[i] == 0) continue;
+        const cv::Rect block = pixels(i);
+        if (plain[i] != 0 && half_side(level) <= k_block)
+          sharp_(block).copyTo(blurred(block));  // a blur changes nothing
+        else
+          work.emplace_back(level, block);
+      }
+    }
+    cv::parallel_for_({0, static_cast<int>(work.size())}, [&](const cv::Range& range) {
+      for (int i = range.start; i < range.end; ++i) {
+        const auto& [level, block] = work[static_cast<std::size_t>(i)];
+        const double sigma = level * k_blur_step_px;
+        const int side = 2 * half_side(level) + 1;
+        cv::Mat blurred = levels_[static_cast<std::size_t>(level)](block);
+        cv::GaussianBlur(sharp_(block), blurred, {side, side}, sigma, sigma, cv::BORDER_REPLICATE);
+      }
     });
   }
 
-  float at(const ProjectorView& view) const {
-    return view.gain * vignette(view) * (dark_ ? black_ * coverage(view) : lookup(view));
+  Light at(const ProjectorView& view) const {
+    const float gain = view.gain * vignette(view);
+    if (dark_) return Light::Constant(gain * (black_ * coverage(view)));
+    return gain * lookup(view);
   }
 
  private:
-  static constexpr int k_pad = 24;  // black pixels around the panel, into which the blur can spread
+  static constexpr int k_pad = 24;    // black pixels around the panel, into which the blur can spread
+  static constexpr int k_block = 48;  // side of the blocks that are blurred or not, px
+  // For each level, whether each block is used; empty: none is.
+  using Blocks = std::array<std::vector<std::uint8_t>, k_blur_levels>;
+
+  static int half_side(int level) { return static_cast<int>(std::ceil(3.5 * level * k_blur_step_px)); }
+
+  cv::Rect pixels(std::size_t block) const {
+    const auto i = static_cast<int>(block);
+    return cv::Rect(i % columns_ * k_block, i / columns_ * k_block, k_block, k_block) &
+           cv::Rect({0, 0}, sharp_.size());
+  }
+
+  // The blocks that have one value together with all blocks around them.
+  std::vector<std::uint8_t> plain_blocks() const {
+    std::vector<std::uint8_t> alone(static_cast<std::size_t>(columns_ * rows_)), plain(alone.size());
+    cv::parallel_for_({0, rows_}, [&](const cv::Range& range) {
+      for (int i = range.start * columns_; i < range.end * columns_; ++i)
+        alone[static_cast<std::size_t>(i)] = is_plain(sharp_(pixels(static_cast<std::size_t>(i)))) ? 1 : 0;
+    });
+    const auto first = [&](int block) {
+      return sharp_.ptr(block / columns_ * k_block, block % columns_ * k_block);
+    };
+    for (int row = 0; row < rows_; ++row)
+      for (int column = 0; column < columns_; ++column) {
+        bool is = true;
+        for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r)
+          for (int c = std::max(0, column - 1); c <= std::min(columns_ - 1, column + 1); ++c)
+            is = is && alone[static_cast<std::size_t>(r * columns_ + c)] != 0 &&
+                 std::memcmp(first(r * columns_ + c), first(row * columns_ + column), sharp_.elemSize()) == 0;
+        plain[static_cast<std::size_t>(row * columns_ + column)] = is ? 1 : 0;
+      }
+    return plain;
+  }
+
+  static bool is_plain(const cv::Mat& image) {
+    const float* first = image.ptr<float>();
+    const std::size_t row_bytes = static_cast<std::size_t>(image.cols) * image.elemSize();
+    for (int column = 1; column < image.cols; ++column)
+      if (std::memcmp(first + column * k_channels, first, image.elemSize()) != 0) return false;
+    for (int row = 1; row < image.rows; ++row)
+      if (std::memcmp(image.ptr(row), first, row_bytes) != 0) return false;
+    return true;
+  }
+
+  Blocks used_blocks(std::span<const ProjectorView> views) const {
+    constexpr std::size_t k_chunk = 65536;
+    const auto chunks = static_cast<int>((views.size() + k_chunk - 1) / k_chunk);
+    Blocks used;
+    std::mutex mutex;
+    cv::parallel_for_({0, chunks}, [&](const cv::Range& range) {
+      Blocks here;
+      const std::size_t end = std::min(views.size(), static_cast<std::size_t>(range.end) * k_chunk);
+      for (std::size_t i = static_cast<std::size_t>(range.start) * k_chunk; i < end; ++i)
+        if (views[i].gain > 0) mark(views[i], &here);
+      const std::lock_guard lock(mutex);
+      for (std::size_t level = 0; level < used.size(); ++level) {
+        if (here[level].empty()) continue;
+        used[level].resize(here[level].size());
+        std::transform(here[level].begin(), here[level].end(), used[level].begin(), used[level].begin(),
+                       std::bit_or<>());
+      }
+    });
+    return used;
+  }
+
+  // Marks the blocks that a lookup reads: its pixel and the next ones to the right and below.
+  void mark(const ProjectorView& view, Blocks* used) const {
+    const std::size_t level = level_of(view.depth);
+    if (level == 0) return;
+    std::vector<std::uint8_t>& blocks = (*used)[level];
+    if (blocks.empty()) blocks.resize(static_cast<std::size_t>(columns_ * rows_));
+    const int c = static_cast<int>(view.u + k_pad), r = static_cast<int>(view.v + k_pad);
+    const int left = c / k_block, right = (c + 1) / k_block, top = r / k_block, bottom = (r + 1) / k_block;
+    blocks[static_cast<std::size_t>(top * columns_ + left)] = 1;
+    if (left == right && top == bottom) return;
+    blocks[static_cast<std::size_t>(top * columns_ + right)] = 1;
+    blocks[static_cast<std::size_t>(bottom * columns_ + left)] = 1;
+    blocks[static_cast<std::size_t>(bottom * columns_ + right)] = 1;
+  }
 
   // Light of all display values, CV_32F or CV_32FC3 (BGR), with as many channels as the image.
   cv::Mat light_of_values(int channels) const {
@@ -62,35 +170,32 @@ class Beam {
     return light;
   }
 
-  cv::Mat light_of(const cv::Mat& shown, int channel) const {
+  cv::Mat light_of(const cv::Mat& shown) const {
+    const cv::Rect inner(k_pad, k_pad, shown.cols, shown.rows);
+    cv::Mat light = cv::Mat::zeros(shown.rows + 2 * k_pad, shown.cols + 2 * k_pad, CV_32FC(k_channels));
     cv::Mat linear = shown;
-    if (shown.depth() == CV_32F) return padded(channel_of(shown * effects_.illuminance_at_1m, channel));
+    if (shown.depth() == CV_32F) {
+      in_channels(shown * effects_.illuminance_at_1m).copyTo(light(inner));
+      return light;
+    }
     if (shown.channels() == 1 && effects_.channel_gamma != Eigen::Vector3d::Ones())
       cv::cvtColor(shown, linear, cv::COLOR_GRAY2BGR);
-    cv::LUT(linear, light_of_values(linear.channels()), linear);
-    return padded(channel_of(linear, channel));
+    cv::Mat into = light(inner);  // without a copy where the channels are already right
+    if (linear.channels() == k_channels) {
+      cv::LUT(linear, light_of_values(k_channels), into);
+    } else {
+      cv::LUT(linear, light_of_values(linear.channels()), linear);
+      in_channels(linear).copyTo(into);
+    }
+    return light;
   }
 
-  static cv::Mat channel_of(cv::Mat light, int channel) {
-    if (light.channels() == 3 && channel == k_grey)
+  static cv::Mat in_channels(cv::Mat light) {
+    if (light.channels() == 3 && k_channels == 1)
       cv::transform(light, light, cv::Matx13f(0.0722F, 0.7152F, 0.2126F));  // BT.709 luminance of BGR
-    else if (light.channels() == 3)
-      cv::extractChannel(light, light, channel);
+    else if (light.channels() == 1 && k_channels == 3)
+      cv::cvtColor(light, light, cv::COLOR_GRAY2BGR);
     return light;
-  }
-
-  static cv::Mat padded(cv::Mat light) {
-    cv::copyMakeBorder(light, light, k_pad, k_pad, k_pad, k_pad, cv::BORDER_CONSTANT, cv::Scalar(0));
-    return light;
-  }
-
-  cv::Mat blurred(std::size_t level) const {
-    if (level == 0) return sharp_;
-    const double sigma = static_cast<double>(level) * k_blur_step_px;
-    const int side = 2 * static_cast<int>(std::ceil(3.5 * sigma)) + 1;
-    cv::Mat result;
-    cv::GaussianBlur(sharp_, result, {side, side}, sigma, sigma, cv::BORDER_REPLICATE);
-    return result;
   }
 
   // A disc of diameter D has a standard deviation of D / 4; D = aperture |depth - focus| / focus on the
@@ -101,14 +206,17 @@ class Beam {
   }
 
   // Bilinear lookup: it averages the projector's square pixels over a camera pixel of similar size.
-  float lookup(const ProjectorView& view) const {
+  Light lookup(const ProjectorView& view) const {
     const cv::Mat& light = levels_[level_of(view.depth)];
     const float x = view.u + k_pad, y = view.v + k_pad;
     const int c = static_cast<int>(x), r = static_cast<int>(y);
     const float fx = x - static_cast<float>(c), fy = y - static_cast<float>(r);
-    const float* upper = light.ptr<float>(r) + c;
-    const float* lower = light.ptr<float>(r + 1) + c;
-    return (1 - fy) * (upper[0] + fx * (upper[1] - upper[0])) + fy * (lower[0] + fx * (lower[1] - lower[0]));
+    const Eigen::Map<const Light> upper_left(light.ptr<float>(r) + k_channels * c),
+        upper_right(light.ptr<float>(r) + k_channels * (c + 1)),
+        lower_left(light.ptr<float>(r + 1) + k_channels * c),
+        lower_right(light.ptr<float>(r + 1) + k_channels * (c + 1));
+    return (1 - fy) * (upper_left + fx * (upper_right - upper_left)) +
+           fy * (lower_left + fx * (lower_right - lower_left));
   }
 
   float coverage(const ProjectorView& view) const {
@@ -127,15 +235,16 @@ class Beam {
   float black_ = 0;
   float vignetting_ = 0;                         // for each squared pixel of distance from the panel's middle
   float blur_levels_m_ = 0, blur_at_focus_ = 0;  // blur level = |blur_at_focus - blur_levels_m / depth|
+  int columns_ = 0, rows_ = 0;                   // number of blocks
   cv::Mat sharp_;
-  std::array<cv::Mat, k_blur_levels> levels_;
+  std::array<cv::Mat, k_blur_levels> levels_;  // valid in the blocks that prepare() was told of
 };
 
-std::vector<Beam> beams_of(const World& world,
-                           const Samples& samples,
-                           std::span<const cv::Mat> shown,
-                           int channel) {
-  std::vector<Beam> beams;
+template <int k_channels>
+std::vector<Beam<k_channels>> beams_of(const World& world,
+                                       const Samples& samples,
+                                       std::span<const cv::Mat> shown) {
+  std::vector<Beam<k_channels>> beams;
   for (std::size_t k = 0; k < samples.projectors.size(); ++k) {
     const Imager& projector = world.rig.projectors.at(k);
     const cv::Mat image = shown.empty() ? cv::Mat() : shown[k];
@@ -143,7 +252,7 @@ std::vector<Beam> beams_of(const World& world,
       LIMN_CHECK(image.cols == projector.width && image.rows == projector.height);
       LIMN_CHECK(image.type() == CV_8UC1 || image.type() == CV_8UC3 || image.type() == CV_32FC3);
     }
-    beams.emplace_back(projector, world.projector_effects.at(k), image, channel);
+    beams.emplace_back(projector, world.projector_effects.at(k), image);
     beams.back().prepare(samples.projectors[k]);
   }
   return beams;
@@ -159,36 +268,42 @@ float unphysical_gain(const World& world, const Samples& samples, std::size_t pr
   return (effects.falloff ? 1 : towards.squaredNorm()) / (effects.incidence ? 1 : std::max(cosine, 1e-3F));
 }
 
-float reflected(const Samples& samples, int channel, std::size_t i) {
-  return channel == k_grey ? samples.grey[i] : samples.weight[i] * samples.albedo[i][channel];
-}
-
-cv::Mat channel_light(const World& world,
-                      const Samples& samples,
-                      std::span<const cv::Mat> shown,
-                      int channel) {
-  const std::vector<Beam> beams = beams_of(world, samples, shown, channel);
-  cv::Mat light(samples.height, samples.width, CV_32F);
+// The light that the camera's pixels receive, CV_32F with these channels.
+template <int k_channels>
+cv::Mat light_in(const World& world, const Samples& samples, std::span<const cv::Mat> shown) {
+  using Light = typename Beam<k_channels>::Light;
+  const std::vector<Beam<k_channels>> beams = beams_of<k_channels>(world, samples, shown);
+  cv::Mat light(samples.height, samples.width, CV_32FC(k_channels));
   auto* out = light.ptr<float>();
   const std::size_t pixels = light.total(), extra = samples.size() - pixels;
-  std::vector<float> more(extra);
+  std::vector<float> more(k_channels * extra);
   const bool physical = std::all_of(world.projector_effects.begin(), world.projector_effects.end(),
                                     [](const ProjectorEffects& e) { return e.falloff && e.incidence; });
+  const auto reflected = [&](std::size_t i) -> Light {
+    if constexpr (k_channels == 1)
+      return Light::Constant(samples.grey[i]);
+    else
+      return samples.weight[i] * samples.albedo[i].array();
+  };
   constexpr std::size_t k_chunk = 16384;
   const auto chunks = static_cast<int>((samples.size() + k_chunk - 1) / k_chunk);
   cv::parallel_for_({0, chunks}, [&](const cv::Range& range) {
     const std::size_t end = std::min(samples.size(), static_cast<std::size_t>(range.end) * k_chunk);
     for (std::size_t i = static_cast<std::size_t>(range.start) * k_chunk; i < end; ++i) {
-      float illuminance = samples.room_light[i];
+      Light illuminance = Light::Constant(samples.room_light[i]);
       for (std::size_t k = 0; k < beams.size(); ++k) {
         const ProjectorView& view = samples.projectors[k][i];
         if (view.gain <= 0) continue;
         illuminance += beams[k].at(view) * (physical ? 1 : unphysical_gain(world, samples, k, i));
       }
-      (i < pixels ? out[i] : more[i - pixels]) = reflected(samples, channel, i) * illuminance;
+      float* at = i < pixels ? out + k_channels * i : more.data() + k_channels * (i - pixels);
+      Eigen::Map<Light> received(at);
+      received = reflected(i) * illuminance;
     }
   });
-  for (std::size_t i = 0; i < extra; ++i) out[samples.pixel[pixels + i]] += more[i];
+  for (std::size_t i = 0; i < extra; ++i)
+    for (std::size_t c = 0; c < k_channels; ++c)
+      out[k_channels * static_cast<std::size_t>(samples.pixel[pixels + i]) + c] += more[k_channels * i + c];
   return light;
 }
 
@@ -311,11 +426,8 @@ double light_share(const ProjectorEffects& effects, int channel, double value) {
 cv::Mat ideal_light(const World& world, const Samples& samples, std::span<const cv::Mat> shown) {
   LIMN_CHECK(shown.empty() || shown.size() == samples.projectors.size());
   if (!world.camera_effects.at(static_cast<std::size_t>(samples.camera)).colour)
-    return channel_light(world, samples, shown, k_grey);
-  std::vector<cv::Mat> channels;
-  for (int c = 0; c < 3; ++c) channels.push_back(channel_light(world, samples, shown, c));
-  cv::Mat light;
-  cv::merge(channels, light);
+    return light_in<1>(world, samples, shown);
+  cv::Mat light = light_in<3>(world, samples, shown);
   mix(world.camera_effects[static_cast<std::size_t>(samples.camera)], &light);
   return light;
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "sim/world.h"
@@ -34,8 +35,38 @@ struct Samples {
   std::size_t size() const { return pixel.size(); }
 };
 
-/// Traces the pixels of a camera. Pixels on silhouettes, texture edges and shadow edges get 32 sub-samples,
+/// How finely a camera's pixels are traced. Less is faster.
+struct TraceEffort {
+  /// Sub-samples of a pixel on an edge, a power of two, at most 32. The edge's position is then known to half
+  /// a pixel divided by this.
+  int edge_samples = 32;
+  int lamp_points = 12;  ///< Points of a lamp's disc, from which its soft shadows are made.
+  bool operator==(const TraceEffort&) const = default;
+};
+
+/// Traces the pixels of a camera. Pixels on silhouettes, texture edges and shadow edges get sub-samples,
 /// merged where they agree. Surfaces are diffuse; light bounces once.
-Samples trace(const World& world, int camera);
+Samples trace(const World& world, int camera, const TraceEffort& effort = {});
+
+/// Traces a camera of a world that changes little from frame to frame. If only poses of objects have changed,
+/// only those parts of the image are traced again that the change can affect: where the objects may be seen,
+/// and where their shadows fall.
+class ViewTracer {
+ public:
+  explicit ViewTracer(int camera);
+  ~ViewTracer();
+  ViewTracer(ViewTracer&&) noexcept;
+  ViewTracer& operator=(ViewTracer&&) noexcept;
+
+  /// What trace() gives for this world, but for rounding. Valid until the next call.
+  const Samples& samples(const World& world, const TraceEffort& effort = {});
+  /// How many pixels the last call of samples() traced.
+  std::size_t traced_pixels() const;
+
+ private:
+  struct Impl;
+  int camera_;
+  std::unique_ptr<Impl> impl_;
+};
 
 }  // namespace limn::sim

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "sim/sensor_model.h"
 
@@ -42,7 +43,9 @@ VirtualRig::VirtualRig(World world, const VirtualRigOptions& options)
     cameras_.push_back(std::make_unique<Camera>(*this, static_cast<int>(i)));
   for (std::size_t i = 0; i < world_.rig.projectors.size(); ++i)
     projectors_.push_back(std::make_unique<Projector>(*this, static_cast<int>(i)));
+  for (std::size_t i = 0; i < cameras_.size(); ++i) tracers_.emplace_back(static_cast<int>(i));
   samples_.resize(cameras_.size());
+  traced_.resize(cameras_.size());
   darken();
 }
 
@@ -54,6 +57,7 @@ device::Display& VirtualRig::projector(int index) { return *projectors_.at(stati
 
 World& VirtualRig::edit() {
   for (auto& samples : samples_) samples.reset();
+  std::fill(traced_.begin(), traced_.end(), nullptr);
   return world_;
 }
 
@@ -97,10 +101,39 @@ void VirtualRig::restore_prototype() {
 
 void VirtualRig::darken() { projected_.assign(projectors_.size(), {ProjectedImage{cv::Mat(), now_}}); }
 
+void VirtualRig::resize(const Rig& sized) {
+  const auto take_sizes = [](const std::vector<Imager>& from, std::vector<Imager>* to) {
+    LIMN_CHECK(from.size() == to->size());
+    for (std::size_t i = 0; i < from.size(); ++i) {
+      (*to)[i].width = from[i].width;
+      (*to)[i].height = from[i].height;
+      (*to)[i].lens = from[i].lens;
+    }
+  };
+  Rig& rig = edit().rig;
+  take_sizes(sized.cameras, &rig.cameras);
+  take_sizes(sized.projectors, &rig.projectors);
+  for (std::size_t i = 0; i < projected_.size(); ++i)
+    for (ProjectedImage& projected : projected_[i])
+      if (!projected.image.empty())
+        cv::resize(projected.image, projected.image, projectors_[i]->size(), 0, 0, cv::INTER_AREA);
+}
+
+void VirtualRig::set_trace_effort(const TraceEffort& effort) {
+  if (effort == effort_) return;
+  effort_ = effort;
+  edit();
+}
+
 const Samples& VirtualRig::samples(int camera) {
-  auto& samples = samples_.at(static_cast<std::size_t>(camera));
-  if (!samples) samples = trace(world_, camera);
-  return *samples;
+  const auto i = static_cast<std::size_t>(camera);
+  const Samples*& traced = traced_.at(i);
+  if (traced) return *traced;
+  if (options_.follows_changes)
+    traced = &tracers_[i].samples(world_, effort_);
+  else
+    traced = &samples_[i].emplace(trace(world_, camera, effort_));
+  return *traced;
 }
 
 Result<Stamp> VirtualRig::show(int projector, const cv::Mat& image) {

@@ -20,6 +20,10 @@ struct VirtualRigOptions {
   /// True: a grab waits until the image shown last is on the surface, as captures need. False: frames come at
   /// the camera's rate, even while an image is on its way (live session).
   bool grab_waits_for_light = true;
+  /// True: after an object has moved, only the affected parts of an image are traced again (ViewTracer). This
+  /// is fast for sessions; it needs more memory, and images may differ from those of a whole trace by
+  /// rounding.
+  bool follows_changes = false;
 };
 
 /// A world whose cameras and projectors behave as devices on a virtual clock. Nothing sleeps, and every run
@@ -41,6 +45,11 @@ class VirtualRig {
   /// Adds an object, or replaces the one of that name.
   void place(const Object& object);
   void remove(const std::string& object);
+  /// Gives cameras and projectors other sizes: those of `sized`, which has the same devices with their lenses
+  /// for these sizes. Poses stay. Projected images are scaled.
+  void resize(const Rig& sized);
+  /// How finely cameras are traced, from the next image on.
+  void set_trace_effort(const TraceEffort& effort);
   /// A camera's sensor settings. Changing them (colour, exposure, encoding) keeps the traced samples.
   CameraEffects& camera_effects(int camera) {
     return world_.camera_effects.at(static_cast<std::size_t>(camera));
@@ -84,7 +93,10 @@ class VirtualRig {
   std::vector<CameraEffects> effects_home_;
   // For each projector, oldest first; the first one is on the surface.
   std::vector<std::vector<ProjectedImage>> projected_;
-  std::vector<std::optional<Samples>> samples_;
+  TraceEffort effort_;
+  std::vector<std::optional<Samples>> samples_;  // those of whole traces
+  std::vector<ViewTracer> tracers_;              // with follows_changes
+  std::vector<const Samples*> traced_;           // the valid samples of each camera; null: to be traced
   std::vector<std::unique_ptr<Camera>> cameras_;
   std::vector<std::unique_ptr<Projector>> projectors_;
 };

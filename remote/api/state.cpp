@@ -98,6 +98,7 @@ SessionState session_state(const session::Session& session,
   out.viewer = show_state.viewer;
   out.follows = session.composed().follows;
   out.repair = session.recalibration().progress;
+  out.pace = session.pace();
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
   out.devices = health.all();
@@ -147,6 +148,7 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["viewer"] = state.viewer;
   out["follows"] = state.follows;
   out["repair"] = state.repair;
+  out["pace"] = state.pace;
   out["windows"] = state.windows;
   out["projectors"] = state.projectors;
   out["devices"] = nlohmann::ordered_json::array();

@@ -44,6 +44,7 @@ struct SessionState {
   std::string follows;  ///< The guest whose tablet is the viewpoint now; empty: none.
   std::vector<std::string> windows;  ///< Guests whose tablets can be the viewpoint.
   std::string repair;                ///< Progress of the recalibration; empty: none runs.
+  std::string pace;                  ///< What is left out to keep real time; empty: nothing.
   std::vector<std::string> projectors;
   std::vector<session::DeviceState> devices;
   std::vector<std::string> waiting;  ///< Loose markers that can be paired.

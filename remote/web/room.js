@@ -33,6 +33,7 @@ export function make_room(session) {
     devices = h("ul", { class: "rows" }),
     people = h("ul", { class: "rows" });
   const no_devices = h("p", { class: "soft small" }, "No devices are monitored.");
+  const pace = h("p", { class: "soft small" });
   const notes = h("ul", { class: "messages small" });
   const no_notes = h("p", { class: "soft small" }, "Nothing to report.");
   const comments = make_comments(session, () => ({ look: session.state.look, slot: "" }), "General comment");
@@ -47,6 +48,7 @@ export function make_room(session) {
     h("h3", {}, "Devices"),
     devices,
     no_devices,
+    pace,
     repair,
     h("h3", {}, "People"),
     people,
@@ -80,6 +82,8 @@ export function make_room(session) {
         devices.children[i].show(device.works ? "works" : "broken", device.why || device.kind),
       );
       no_devices.hidden = state.devices.length > 0;
+      pace.hidden = !state.pace;
+      set_text(pace, state.pace ?? "");
       keep(
         people,
         state.guests.map((guest, i) => ({ ...guest, i })),

@@ -1,12 +1,15 @@
-// What a live session costs apart from rendering: processor time for each 1280x1024 frame (JPEG decoding,
-// marker detection, poses, filter, hand-over), compared with libapriltag's detection in the same frames. Also
-// what a recording adds to a frame's time, how long an edit takes, and whether memory grows. Usage: limn
-// bench live [--frames N (60)]
+// How many frames a second a session on the virtual rig makes, divided by the camera's 30: as fast as it can,
+// and in real time, where the effort follows. Then what a live session costs apart from rendering: processor
+// time for each 1280x1024 frame (JPEG decoding, marker detection, poses, filter, hand-over), compared with
+// libapriltag's detection in the same frames. Also what a recording adds to a frame's time, how long an edit
+// takes, and whether memory grows. Usage: limn bench live [--frames N (60)] [--session: only the virtual
+// session]
 #include <fmt/core.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <charconv>
 #include <chrono>
 #include <cstring>
@@ -14,12 +17,15 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 
 #include "core/image_io.h"
 #include "core/median.h"
+#include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "session/latest.h"
@@ -27,6 +33,8 @@
 #include "session/recording.h"
 #include "session/script.h"
 #include "session/session.h"
+#include "session/session_output.h"
+#include "session/virtual_session.h"
 #include "sim/virtual_rig.h"
 #include "tests/bench/tracker_peers.h"
 #include "tracker/marker_image.h"
@@ -65,10 +73,14 @@ double mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
+sim::World whole_studio() {
+  return sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image)
+      .value();
+}
+
 // The studio, seen by a camera of 1280x1024.
 sim::World studio() {
-  sim::World world =
-      sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image).value();
+  sim::World world = whole_studio();
   Imager& camera = world.rig.cameras[0];
   constexpr int k_width = 1280, k_height = 1024;
   camera.lens = Lens::pinhole(1467, 1467, 0.5 * (k_width - 1), 0.5 * (k_height - 1));
@@ -298,14 +310,112 @@ void print_memory(const std::vector<Shot>& shots, const SessionSetup& setup) {
              k_rounds * shots.size(), first_mib, resident_mib());
 }
 
+// What moves in a session on the virtual rig: this marker, with what is attached to it; empty: nothing.
+struct Motion {
+  std::string name, marker;
+};
+
+constexpr double k_period_s = 1 / 30.0;
+
+// A session on the virtual rig. No recording, and nobody looks at the screen.
+class VirtualPlay {
+ public:
+  VirtualPlay(double share, const Motion& motion)
+      : rig_(coarser(share), session::virtual_rig_options(k_period_s)) {
+    session::Script script;
+    if (!motion.marker.empty()) script.sways.push_back({motion.marker, 0, 1e9, {0.05, 0, 0}, 0.5});
+    room_.emplace(session::ScriptedRoom::create(script, &rig_).value());
+    setup_.rig = rig_.world().rig;
+    setup_.scene = *rig_.world().scene;
+    output_.emplace(session::SessionOutput::open({}, {}, &setup_).value());
+    perception_.emplace(Perception::create(setup_.scene, setup_.rig, setup_.watch).value());
+    session_.emplace(Session::create(setup_, &output_->telemetry(), nullptr, false).value());
+  }
+  const Rig& rig() const { return rig_.world().rig; }
+  const Session& session() const { return *session_; }
+  // Median of a measure of telemetry; number of frames so far.
+  double stage_ms(const char* name) {
+    return output_->telemetry().summary()[name]["median"].get<double>();
+  }
+  int frames() { return output_->telemetry().summary()["pictures"].get<int>(); }
+  void play(double seconds, const session::RealTime* real_time = nullptr) {
+    const session::SessionParts parts{*perception_, *session_, *output_};
+    const std::atomic<bool> is_ended = false;
+    LIMN_CHECK(
+        session::play_virtually(seconds_of(rig_.now()) + seconds, real_time, is_ended, &rig_, &*room_, parts)
+            .ok());
+  }
+
+ private:
+  static sim::World coarser(double share) {
+    sim::World world = whole_studio();
+    LIMN_CHECK(scale_resolution(share, &world.rig).ok());
+    return world;
+  }
+
+  sim::VirtualRig rig_;
+  SessionSetup setup_;
+  std::optional<session::ScriptedRoom> room_;
+  std::optional<session::SessionOutput> output_;
+  std::optional<Perception> perception_;
+  std::optional<Session> session_;
+};
+
+// As fast as the machine can. 1: as many frames a second as the camera sends.
+void print_pace(double share, const Motion& motion, int frames) {
+  VirtualPlay played(share, motion);
+  played.play(20 * k_period_s);  // the prototype comes to rest, and everything is prepared
+  const double begun = wall_ms(), begun_processor = processor_ms();
+  played.play(frames * k_period_s);
+  const double frame_ms = (wall_ms() - begun) / frames;
+  const Imager &camera = played.rig().cameras[0], &projector = played.rig().projectors[0];
+  fmt::print(
+      "  camera {:>4}x{:<4} projectors {:>4}x{:<4} {:<16} {:5.2f}  {:7.1f}  {:7.1f}  {:7.1f}  {:7.1f}\n",
+      camera.width, camera.height, projector.width, projector.height, motion.name,
+      1e3 * k_period_s / frame_ms, frame_ms, (processor_ms() - begun_processor) / frames,
+      played.stage_ms("detect_ms") + played.stage_ms("filter_ms"), played.stage_ms("paint_ms"));
+}
+
+// As a session that people take part in: the effort follows the machine.
+void print_real_time(const Motion& motion) {
+  constexpr double k_settle_s = 12, k_seconds = 4;
+  VirtualPlay played(1, motion);
+  const Rig whole = played.rig();
+  session::RealTime real_time{whole, k_period_s, session::efforts_for(whole, true)};
+  played.play(k_settle_s, &real_time);
+  const auto share = [&] { return 1.0 * played.rig().cameras[0].width / whole.cameras[0].width; };
+  for (std::size_t i = 0; i < real_time.efforts.size(); ++i)
+    if (session::sentence(real_time.efforts[i]) == played.session().pace()) real_time.first = i;
+  const int before = played.frames();
+  played.play(k_seconds, &real_time);
+  fmt::print("  in real time, {}: {:.2f} of the camera's frames at {:.0f} % of the resolution. {}\n",
+             motion.name, (played.frames() - before) * k_period_s / k_seconds, 100 * share(),
+             played.session().pace());
+}
+
+void print_paces(int frames) {
+  const std::vector<Motion> motions = {{"nothing moves", ""}, {"a marker moves", "aruco_4x4_50:0"}};
+  fmt::print(
+      "virtual session: frames a second divided by the camera's; ms a frame: by the clock, by processors, "
+      "markers, projectors' images\n");
+  for (const double share : {1.0, 0.5})
+    for (const Motion& motion : motions) print_pace(share, motion, frames);
+  for (const Motion& motion : motions) print_real_time(motion);
+}
+
 int run(int argc, char** argv) {
   int count = 60;
+  bool only_session = false;
   for (int i = 1; i < argc; ++i) {
+    if (std::strcmp(argv[i], "--session") == 0) {
+      only_session = true;
+      continue;
+    }
     const bool is_frames = std::strcmp(argv[i], "--frames") == 0 && i + 1 < argc;
     const char* text = is_frames ? argv[++i] : "";
     const auto parsed = std::from_chars(text, text + std::strlen(text), count);
     if (!is_frames || parsed.ec != std::errc() || *parsed.ptr != '\0' || count < 3 || count > 10000) {
-      fmt::print(stderr, "live_bench: expected --frames N (3 to 10000), found '{}'.\n", argv[i]);
+      fmt::print(stderr, "live_bench: expected --frames N (3 to 10000) or --session, found '{}'.\n", argv[i]);
       return 2;
     }
   }
@@ -314,6 +424,8 @@ int run(int argc, char** argv) {
     fmt::print(stderr, "live_bench: {}\n", context.message());
     return 1;
   }
+  print_paces(count);
+  if (only_session) return 0;
   SessionSetup setup;
   const std::vector<Shot> frames = shots(count, &setup);
   for (const Wire& wire : wires()) print_cost(frames, setup, wire);

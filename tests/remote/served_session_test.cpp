@@ -228,7 +228,7 @@ TEST_F(AServedSession, TellsTheStateOfTheDocumentation) {
        {"number",   "slots",   "prototype", "looks",         "look",    "other_look", "deleted_look",
         "blackout", "frozen",  "grid",      "marker_states", "split",   "outputs",    "light",
         "split_mm", "screen",  "viewer",    "follows",       "windows", "screens",    "projectors",
-        "devices",  "waiting", "guests",    "comments",      "notes",   "repair"})
+        "devices",  "waiting", "guests",    "comments",      "notes",   "repair",     "pace"})
     EXPECT_TRUE(state.contains(key)) << key;
 }
 

@@ -52,7 +52,10 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
   }
   void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
     calls += images.empty() ? "no-screens " : "screens ";
+    for (const auto& [screen, image] : images) drawn += image.empty() ? 0 : 1;
   }
+  double screen_interval_s() const override { return interval_s; }
+  bool wants_screen() const override { return wants; }
   void apply_edits(const SessionMoment&) override { calls += "client-edits "; }
   void publish_state(const SessionMoment& moment) override {
     calls += moment.shown ? "publish-shown " : "publish ";
@@ -68,7 +71,9 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
 
   std::string calls;
   int steps = 0;
-  bool shows = true, ends = false, covered = false, same = false;
+  bool shows = true, ends = false, covered = false, same = false, wants = false;
+  double interval_s = 0;
+  int drawn = 0;  // images of the screen
 
  private:
   sim::VirtualRig* rig_;
@@ -123,6 +128,24 @@ TEST_F(AFrameLoop, TakesInWhatChangesWhenNoImageIsDue) {
   ASSERT_TRUE(played(2));
   EXPECT_EQ(notes_->calls, "perceive edit client-edits perceive edit client-edits ");
   EXPECT_EQ(session_->composed().painted_at, Stamp{});
+}
+
+TEST_F(AFrameLoop, DrawsTheScreenOnlyForThoseWhoLookAtIt) {
+  ASSERT_TRUE(played(3));
+  EXPECT_EQ(notes_->drawn, 0) << "nobody looks";
+  notes_->wants = true;
+  ASSERT_TRUE(played(3));
+  EXPECT_EQ(notes_->drawn, 3);
+  notes_->wants = false;
+  ASSERT_TRUE(played(2));
+  EXPECT_EQ(notes_->drawn, 3);
+}
+
+TEST_F(AFrameLoop, DrawsTheScreenNoMoreOftenThanTheSinkSays) {
+  notes_->wants = true;
+  notes_->interval_s = 3600;
+  ASSERT_TRUE(played(4));
+  EXPECT_EQ(notes_->drawn, 1);
 }
 
 TEST_F(AFrameLoop, EndsWhenAClientDoes) {

@@ -7,6 +7,7 @@
 #include "sim/sensor_model.h"
 #include "tests/sim/small_world.h"
 #include "tests/support/matchers.h"
+#include "tests/support/random.h"
 
 namespace limn {
 namespace {
@@ -152,6 +153,65 @@ TEST(Trace, AnotherPatternIsALookup) {
   const cv::Mat traced = sim::photograph(world, sim::trace(world, 0), std::vector<cv::Mat>{b}, 2);
   EXPECT_TRUE(image_near(lookup, traced, 0, 0, "lookup"));
   EXPECT_GT(cv::norm(lookup, sim::photograph(world, samples, std::vector<cv::Mat>{a}, 2)), 100);
+}
+
+// A wall with two sheets before it, under a soft lamp.
+sim::World room_with_sheets() {
+  sim::World world = small_world();
+  world.room.ambient = 0.2;
+  world.room.lamps = {{{-0.4, -0.3, 0.8}, 1.0, 0.06}};
+  cv::Mat checks(8, 8, CV_8U);
+  for (int i = 0; i < 64; ++i) checks.at<std::uint8_t>(i / 8, i % 8) = (i + i / 8) % 2 != 0 ? 255 : 0;
+  world.objects.push_back(sim::sheet("moving", 0.06, 0.06, checks, facing_minus_y(0.05, 0.8, 0)));
+  world.objects.push_back(sim::sheet("still", 0.1, 0.1, checks, facing_minus_y(-0.15, 0.7, 0.1)));
+  return world;
+}
+
+TEST(Trace, AfterAMoveTheAffectedPixelsAreTracedAndTheRestStaysTrue) {
+  sim::World world = room_with_sheets();
+  sim::ViewTracer tracer(0);
+  EXPECT_EQ(tracer.samples(world).size(), sim::trace(world, 0).size());
+  EXPECT_EQ(tracer.traced_pixels(), 320U * 240U);
+  (void)tracer.samples(world);
+  EXPECT_EQ(tracer.traced_pixels(), 0U) << "nothing has moved";
+  auto rng = test_rng();
+  for (int i = 0; i < 12; ++i) {
+    const Eigen::Vector3d at(uniform(rng, -0.3, 0.3), uniform(rng, 0.5, 0.9), uniform(rng, -0.2, 0.2));
+    const Eigen::Vector3d turn(uniform(rng, -1, 1), uniform(rng, -1, 1), uniform(rng, -1, 1));
+    world.find("moving")->world_from_object =
+        facing_minus_y(at.x(), at.y(), at.z()) * Pose(exp_rotation(turn), Eigen::Vector3d::Zero());
+    const sim::Samples whole = sim::trace(world, 0);
+    const sim::Samples& followed = tracer.samples(world);
+    EXPECT_GT(tracer.traced_pixels(), 500U);
+    EXPECT_LT(tracer.traced_pixels(), 320U * 240U * 6 / 10);
+    ASSERT_EQ(followed.pixel, whole.pixel) << "move " << i;
+    EXPECT_EQ(followed.object, whole.object);
+    const cv::Mat white(150, 200, CV_8U, cv::Scalar(255));
+    const cv::Mat a = sim::ideal_light(world, followed, std::vector<cv::Mat>{white});
+    const cv::Mat b = sim::ideal_light(world, whole, std::vector<cv::Mat>{white});
+    EXPECT_LT(cv::norm(a, b, cv::NORM_INF), 1e-4) << "move " << i;
+    EXPECT_GT(cv::norm(b, cv::NORM_INF), 0.5);
+  }
+}
+
+TEST(Trace, AnObjectThatComesOrGoesIsTracedToo) {
+  sim::World world = room_with_sheets();
+  sim::ViewTracer tracer(0);
+  (void)tracer.samples(world);
+  world.objects.push_back(sim::sheet("hand", 0.2, 0.2, {}, facing_minus_y(0, 0.6, 0)));
+  EXPECT_EQ(tracer.samples(world).object, sim::trace(world, 0).object);
+  world.objects.erase(world.objects.begin() + 1);
+  EXPECT_EQ(tracer.samples(world).object, sim::trace(world, 0).object);
+}
+
+TEST(Trace, FewerSamplesAtEdgesKeepTheLight) {
+  const sim::World world = room_with_sheets();
+  const sim::Samples fine = sim::trace(world, 0),
+                     coarse = sim::trace(world, 0, {.edge_samples = 8, .lamp_points = 3});
+  EXPECT_LT(coarse.size(), fine.size());
+  const cv::Mat a = sim::ideal_light(world, fine, {}), b = sim::ideal_light(world, coarse, {});
+  EXPECT_NEAR(cv::mean(a)[0], cv::mean(b)[0], 0.01 * cv::mean(a)[0]);
+  EXPECT_LT(cv::norm(a, b, cv::NORM_L2) / cv::norm(a, cv::NORM_L2), 0.05);
 }
 
 }  // namespace
