@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -399,6 +400,16 @@ Status observe_scenes(const CaptureSet& captures,
   return {};
 }
 
+// How many series of images may be decoded at the same time, so that they stay below 3 GB together.
+int series_at_once(const CaptureSet& captures) {
+  constexpr double k_bytes_per_pixel = 110;  // measured with images of 12 million pixels
+  constexpr double k_most_bytes = 3e9;
+  double pixels = 1;
+  for (const CapturedDevice& camera : captures.cameras)
+    pixels = std::max(pixels, static_cast<double>(camera.width) * camera.height);
+  return static_cast<int>(std::clamp(k_most_bytes / (k_bytes_per_pixel * pixels), 1.0, 1e6));
+}
+
 }  // namespace
 
 Result<Observed> observe(const CaptureSet& captures,
@@ -411,20 +422,23 @@ Result<Observed> observe(const CaptureSet& captures,
   for (const CapturedPose& pose : captures.poses) observed.observations.poses.push_back(pose.name);
   const int cameras = static_cast<int>(captures.cameras.size());
   const int count = static_cast<int>(captures.poses.size()) * cameras;
-  // Cameras and poses are processed independently, on as many threads as there are cores, and joined in
+  // Cameras and poses are processed independently, as many at once as cores and memory allow, and joined in
   // order.
   std::vector<std::optional<Result<Observed>>> parts(static_cast<size_t>(count));
   Progress progress("decode", count);
   std::mutex progress_mutex;
   int done = 0;
-  parallel_for(count, [&](int i) {
-    if (should_continue && !should_continue()) {
-      parts[static_cast<size_t>(i)] = error("{}", k_ended);
-      return;
+  std::atomic<int> next = 0;
+  parallel_for(std::min(count, series_at_once(captures)), [&](int) {
+    for (int i = next++; i < count; i = next++) {
+      if (should_continue && !should_continue()) {
+        parts[static_cast<size_t>(i)] = error("{}", k_ended);
+        continue;
+      }
+      parts[static_cast<size_t>(i)] = observe_pose(captures, i / cameras, i % cameras, options);
+      const std::lock_guard lock(progress_mutex);
+      progress.step(++done);
     }
-    parts[static_cast<size_t>(i)] = observe_pose(captures, i / cameras, i % cameras, options);
-    const std::lock_guard lock(progress_mutex);
-    progress.step(++done);
   });
   for (const auto& part : parts) {
     LIMN_TRY_STATUS(part->ok() ? Status() : Status(part->error()));

@@ -47,7 +47,7 @@ constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
 // leaves 0.15; with less, edges are found from coarser bits alone.
 constexpr double k_sharp = 0.15;
 constexpr double k_in_focus = 0.5;         // the same of sound captures
-constexpr double k_least_contrast = 0.01;  // noise hides less
+constexpr double k_least_stripe_contrast = 0.01;  // noise hides less
 constexpr double k_seen_stripe_px = 1.4;   // in camera pixels; narrower stripes blur in the sharpest camera
 constexpr double k_pedestal = 16;          // maximum number of levels that sensors add to black
 constexpr double k_room_share = 0.6;       // the room's share of white's light
@@ -418,7 +418,7 @@ void note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
   if (contrast >= k_sharp) return;
   // Stripes of a Gaussian blur keep the contrast exp(-(pi blur / width)^2 / 2); the scatter of an edge is
   // proportional to the blur. In focus it is that of k_in_focus.
-  const double blurs = std::sqrt(std::log(std::max(contrast, k_least_contrast)) / std::log(k_in_focus));
+  const double blurs = std::sqrt(std::log(std::max(contrast, k_least_stripe_contrast)) / std::log(k_in_focus));
   faults->push_back(
       {FaultName::defocus,
        fmt::format(
