@@ -513,11 +513,20 @@ TEST(Live, TakesOverPartsThatAreSavedAndKeepsThemWhenTheyBreak) {
       for (int i = 0; i < 400 && lines_of(events).size() < before + more; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     };
+    // The recording keeps a copy of each scene that is taken over.
+    const auto wait_for_copy = [&](const std::string& scene, std::uintmax_t bytes) {
+      const fs::path copy = options.record / scene / "slots/mirror/new.glb";
+      std::error_code absent;
+      for (int i = 0; i < 400 && fs::file_size(copy, absent) != bytes; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    };
     wait_for_images(4);
     fs::copy_file(folder / "door/mirror-sport.glb", dropped);
-    wait_for_images(16);
+    wait_for_copy("scene-2", fs::file_size(folder / "door/mirror-sport.glb"));
+    wait_for_images(4);
     fs::resize_file(dropped, 1000);
-    wait_for_images(16);
+    wait_for_copy("scene-3", 1000);
+    wait_for_images(4);
     std::raise(SIGHUP);
   });
   const Status lived = apps::run_live(options);
