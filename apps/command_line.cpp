@@ -381,10 +381,11 @@ void add_solve(CLI::App& app, Run& run) {
                    "mrcal lens model of the projectors; auto chooses each projector's by held-out error")
       ->capture_default_str();
   command
-      ->add_option("--known-length", options->scale_bar_lengths,
-                   "Scale bar: two markers and their measured distance, such as 'apriltag_36h11:3 "
-                   "apriltag_36h11:7 250mm', or a marker and its side, such as 'apriltag_36h11:3 40mm'; repeat "
-                   "the option for more")
+      ->add_option(
+          "--known-length", options->scale_bar_lengths,
+          "Scale bar: two markers and their measured distance, such as 'apriltag_36h11:3 "
+          "apriltag_36h11:7 250mm', or a marker and its side, such as 'apriltag_36h11:3 40mm'; repeat "
+          "the option for more")
       ->allow_extra_args(false);
   add_board_measured(command, &options->board_measured);
   command->add_flag(

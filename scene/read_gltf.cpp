@@ -127,8 +127,7 @@ class GltfReader {
     }
     std::set<std::size_t> children;
     for (const json& node : nodes())
-      for (const json& child : node.value("children", json::array()))
-        children.insert(whole_number(child));
+      for (const json& child : node.value("children", json::array())) children.insert(whole_number(child));
     for (std::size_t i = 0; i < nodes().size(); ++i)
       if (children.count(i) == 0) out.push_back(i);
     return out;

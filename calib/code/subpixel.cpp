@@ -89,7 +89,7 @@ Crossing crossing(const Axis& axis, int edge, cv::Point a, cv::Point b, int at) 
   if (!axis.reading.shake.empty()) {
     const PairShake& shake = axis.reading.shake[bit];
     const auto more = static_cast<float>(shake.gain_difference / 2);
-    share = (first - more * axis.noise.sum.ptr<ushort>(a.y)[a.x]) / step;
+    share = (first - more * static_cast<float>(axis.noise.sum.ptr<ushort>(a.y)[a.x])) / step;
     const cv::Vec2f slope = axis.reading.slopes.at(a.x, a.y);
     const float moved =
         slope[0] * static_cast<float>(shake.shift_px.x()) + slope[1] * static_cast<float>(shake.shift_px.y());

@@ -121,10 +121,11 @@ std::vector<Vector2d> displacements(const Observations& observations,
 Fault glued(const SheetStep& step) {
   return {
       FaultName::uneven_print,
-      fmt::format("the board seems to be glued from two sheets: from about its {} {} of inner corners on, all are "
-                  "displaced by {:.2f} mm across and {:.2f} mm down",
-                  step.is_between_columns ? "column" : "row", step.line + 1, 1e3 * step.offset_m.x(),
-                  1e3 * step.offset_m.y()),
+      fmt::format(
+          "the board seems to be glued from two sheets: from about its {} {} of inner corners on, all are "
+          "displaced by {:.2f} mm across and {:.2f} mm down",
+          step.is_between_columns ? "column" : "row", step.line + 1, 1e3 * step.offset_m.x(),
+          1e3 * step.offset_m.y()),
       "print the board on one sheet, or glue the sheets again, edge to edge", Severity::doubt};
 }
 

@@ -46,13 +46,13 @@ constexpr double k_shift_share = 0.000125, k_shift_px = 0.1;
 // Share of full contrast that is left on stripes of 2 pixels: a blur of 1.2 pixels (standard deviation)
 // leaves 0.15; with less, edges are found from coarser bits alone.
 constexpr double k_sharp = 0.15;
-constexpr double k_in_focus = 0.5;         // the same of sound captures
+constexpr double k_in_focus = 0.5;                // the same of sound captures
 constexpr double k_least_stripe_contrast = 0.01;  // noise hides less
-constexpr double k_seen_stripe_px = 1.4;   // in camera pixels; narrower stripes blur in the sharpest camera
-constexpr double k_pedestal = 16;          // maximum number of levels that sensors add to black
-constexpr double k_room_share = 0.6;       // the room's share of white's light
-constexpr double k_rough_aspect = 0.05;    // deviation of fy / fx from 1, from homographies alone
-constexpr size_t k_least_corners = 8;      // minimum for a homography that noise does not distort
+constexpr double k_seen_stripe_px = 1.4;  // in camera pixels; narrower stripes blur in the sharpest camera
+constexpr double k_pedestal = 16;         // maximum number of levels that sensors add to black
+constexpr double k_room_share = 0.6;      // the room's share of white's light
+constexpr double k_rough_aspect = 0.05;   // deviation of fy / fx from 1, from homographies alone
+constexpr size_t k_least_corners = 8;     // minimum for a homography that noise does not distort
 constexpr double k_saturated_share = 0.2;
 // Deviation of the waves' mean light from one half: as for a gamma that is 12 % off. Beyond it the phase of 3
 // steps errs by 0.1 pixel in waves of 16; 6 steps tolerate more.
@@ -418,7 +418,8 @@ void note_defocus(const PairSeries& seen, std::vector<Fault>* faults) {
   if (contrast >= k_sharp) return;
   // Stripes of a Gaussian blur keep the contrast exp(-(pi blur / width)^2 / 2); the scatter of an edge is
   // proportional to the blur. In focus it is that of k_in_focus.
-  const double blurs = std::sqrt(std::log(std::max(contrast, k_least_stripe_contrast)) / std::log(k_in_focus));
+  const double blurs =
+      std::sqrt(std::log(std::max(contrast, k_least_stripe_contrast)) / std::log(k_in_focus));
   faults->push_back(
       {FaultName::defocus,
        fmt::format(

@@ -221,7 +221,7 @@ void print_codes(const std::vector<Shot>& shots) {
 struct FrameCost {
   double wall_ms = 0, processor_ms = 0;  // in all threads, including the recording's
 };
-FrameCost session_cost(const std::vector<Shot>& shots, SessionSetup setup, const fs::path& record) {
+FrameCost session_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const fs::path& record) {
   std::unique_ptr<session::Recorder> recorder;
   if (!record.empty()) recorder = session::Recorder::create(record, setup).value();
   auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
@@ -334,9 +334,7 @@ class VirtualPlay {
   const Rig& rig() const { return rig_.world().rig; }
   const Session& session() const { return *session_; }
   // Median of a measure of telemetry; number of frames so far.
-  double stage_ms(const char* name) {
-    return output_->telemetry().summary()[name]["median"].get<double>();
-  }
+  double stage_ms(const char* name) { return output_->telemetry().summary()[name]["median"].get<double>(); }
   int frames() { return output_->telemetry().summary()["pictures"].get<int>(); }
   void play(double seconds, const session::RealTime* real_time = nullptr) {
     const session::SessionParts parts{*perception_, *session_, *output_};

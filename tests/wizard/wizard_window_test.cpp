@@ -74,7 +74,8 @@ TEST(WizardPanel, ShowsWhereTheBoardIsAndWhereItIsToGo) {
     WizardView view = a_view();
     view.cameras.pop_back();
     WizardWish wish = WizardWish::none;
-    for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { wish = draw_wizard(gui, view, &board_size); });
+    for (int i = 0; i < 2; ++i)
+      canvas.draw([&](gui::Gui& gui) { wish = draw_wizard(gui, view, &board_size); });
     EXPECT_EQ(wish, WizardWish::none);
     canvas.keep(fmt::format("wizard-{}", size.width));
     const auto count = [&](const cv::Scalar& low, const cv::Scalar& high) {
@@ -153,7 +154,9 @@ TEST(WizardPanel, EndsWithAVerdictAndWhereLightIsSure) {
   for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { draw_wizard(gui, view, &board_size); });
   canvas.keep("wizard-end");
   bool is_closed = false;
-  const auto draw = [&](gui::Gui& gui) { is_closed |= draw_wizard(gui, view, &board_size) == WizardWish::leave; };
+  const auto draw = [&](gui::Gui& gui) {
+    is_closed |= draw_wizard(gui, view, &board_size) == WizardWish::leave;
+  };
   canvas.click({360, 970}, draw);
   EXPECT_TRUE(is_closed);
 }
