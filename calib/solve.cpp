@@ -304,8 +304,7 @@ PixelAspect pixel_aspect(const Solution& solution) {
 
 // What costs less than a tenth of a millimetre of light.
 constexpr double k_least_aspect = 4e-4, k_least_smooth_m = 0.03e-3;
-constexpr double k_better_fit =
-    0.9;  // share of the corners' scatter; chance changes it by less than a hundredth
+constexpr double k_better_fit = 0.9;  // share of the corners' scatter; chance changes it by a hundredth
 
 bool are_square(const PixelAspect& pixels) {
   constexpr double k_far = 3;  // standard deviations

@@ -130,6 +130,16 @@ double root_mean_square(const std::vector<double>& values) {
   return values.empty() ? 0 : std::sqrt(squared / static_cast<double>(values.size()));
 }
 
+// The scatter of measured values about their median, without that of the measurement: robust, because a pair
+// whose stripes the camera does not resolve, or of which it sees one, is measured badly.
+double robust_scatter(const std::vector<double>& values, const std::vector<double>& stddevs) {
+  const double middle = median(values), own = median(stddevs);
+  std::vector<double> sizes;
+  for (const double value : values) sizes.push_back(std::abs(value - middle));
+  const double all = 1.4826 * median(std::move(sizes));
+  return std::sqrt(std::max(0.0, all * all - own * own));
+}
+
 }  // namespace
 
 ShakeReference::ShakeReference(const cv::Mat& white, const cv::Mat& black) {
@@ -202,16 +212,6 @@ PairShake ShakeReference::measure(const cv::Mat& image, const cv::Mat& inverse) 
     shake.gain_stddev = 2 * std::sqrt(fit->covariance(1, 1));
   }
   return shake;
-}
-
-// The scatter of measured values about their median, without that of the measurement: robust, because a pair
-// whose stripes the camera does not resolve, or of which it sees one, is measured badly.
-double robust_scatter(const std::vector<double>& values, const std::vector<double>& stddevs) {
-  const double middle = median(values), own = median(stddevs);
-  std::vector<double> sizes;
-  for (const double value : values) sizes.push_back(std::abs(value - middle));
-  const double all = 1.4826 * median(std::move(sizes));
-  return std::sqrt(std::max(0.0, all * all - own * own));
 }
 
 Shake shake_of(const std::array<std::vector<PairShake>, 2>& pairs) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <memory>
 #include <opencv2/imgproc.hpp>
 #include <set>
 
@@ -239,17 +240,20 @@ TEST(Faults, WhiteDrivesTheCameraToFullScale) {
   expect_named(diagnosis_of(bright, "exposure 2.2 times too long"), "saturated");
 }
 
-// The display was late: the camera saw the previous image.
+// The display is late once: in pose 2 the camera sees image 8 again instead of image 9.
+void repeat_image_nine_of_pose_two(FaultBench* late) {
+  const auto repeated = std::make_shared<bool>(false);
+  const auto last = std::make_shared<cv::Mat>();
+  late->before_shot = [=](int pose, int shot, sim::World*) { *repeated = pose == 2 && shot == 9; };
+  late->on_photo = [=](const cv::Mat& photo) {
+    if (!*repeated) *last = photo.clone();
+    return last->clone();
+  };
+}
+
 TEST(Faults, OneImageIsTheOneBefore) {
   FaultBench late = bench();
-  cv::Mat last;
-  int pose_now = -1, shot_now = -1;
-  late.before_shot = [&](int pose, int shot, sim::World*) { pose_now = pose, shot_now = shot; };
-  late.on_photo = [&](const cv::Mat& photo) {
-    const bool repeated = pose_now == 2 && shot_now == 9;
-    if (!repeated) last = photo.clone();
-    return last.clone();
-  };
+  repeat_image_nine_of_pose_two(&late);
   const Diagnosis diagnosis = diagnosis_of(late, "one picture repeated");
   expect_named(diagnosis, "repeated_pictures", {"low_decode"});  // in that pose a wide stripe is missing
   EXPECT_NE(to_text(diagnosis.faults).find("pose02, camera0 of projector0: 009.png"), std::string::npos)
@@ -261,14 +265,7 @@ TEST(Faults, OneImageIsTheOneBefore) {
 TEST(Faults, OneImageOfABlurredSeriesIsTheOneBefore) {
   FaultBench late = bench();
   late.world.camera_effects[0].psf_px = 1.8;
-  cv::Mat last;
-  int pose_now = -1, shot_now = -1;
-  late.before_shot = [&](int pose, int shot, sim::World*) { pose_now = pose, shot_now = shot; };
-  late.on_photo = [&](const cv::Mat& photo) {
-    const bool repeated = pose_now == 2 && shot_now == 9;
-    if (!repeated) last = photo.clone();
-    return last.clone();
-  };
+  repeat_image_nine_of_pose_two(&late);
   const Diagnosis diagnosis = diagnosis_of(late, "one picture repeated, camera out of focus");
   EXPECT_TRUE(diagnosis.names.count("defocus")) << to_text(diagnosis.faults);
   expect_named(diagnosis, "repeated_pictures", {"defocus", "low_decode", "odd_pose"});
