@@ -57,10 +57,9 @@ struct Bits {
   int border_cells = 0;
   std::array<int, 4> side_errors{};  // errors on each side of the border, without its corners
 
-  // Whether all errors of the border lie on one side, and are few.
-  bool one_side_is_broken() const {
-    const int most = *std::max_element(side_errors.begin(), side_errors.end());
-    return border_errors == most && most <= k_broken_side_errors;
+  // Whether the errors of the border are few, and none lies anywhere but on `side`.
+  bool only_breaks(std::size_t side) const {
+    return border_errors == side_errors[side] && border_errors <= k_broken_side_errors;
   }
 };
 
@@ -184,7 +183,7 @@ double random_hit(const CodeFamily& family, int readable, int errors) {
 
 // Whether the cells are a code without a doubt, but for a part of one side of the border.
 bool is_clear_beside_broken_side(const CodeFamily& family, const Bits& bits) {
-  return bits.one_side_is_broken() && bits.mean_margin >= k_min_broken_margin &&
+  return bits.mean_margin >= k_min_broken_margin &&
          random_hit(family, family.cells * family.cells, 0) <= k_max_broken_hit &&
          nearest(family.codes, bits.code, ~std::uint64_t{0}).errors == 0;
 }
@@ -221,11 +220,6 @@ void read_code(const std::vector<CodeFamily>& families,
   const bool few = count <= k_few_bits;
   const bool covered = reading == Reading::covered;
   if (covered && !can_be_covered(family)) return;
-  if (reading == Reading::broken_side) {
-    if (can_have_broken_side(family) && is_clear_beside_broken_side(family, bits))
-      read_code(families, family, bits, limit, readable_bits(bits, count, 0), readings);
-    return;
-  }
   const double border_share = covered ? k_border_errors_covered
                               : few   ? k_border_errors_few_bits
                                       : k_border_errors;
@@ -399,18 +393,44 @@ void read_codes(const QuadReader& reader,
   }
 }
 
-// Whether the paper around the square is light, but for a part that something dark may hide.
-bool has_light_surroundings(const QuadReader& reader) {
-  constexpr int k_places = 8;  // places along a side
-  Places places;
+// Whether the paper beside each side (top, right, bottom, left) is light.
+std::array<bool, 4> light_surroundings(const QuadReader& reader) {
+  constexpr int k_places = 8;       // places along a side
+  constexpr int k_dark_places = 1;  // that may be dark
+  std::array<Places, 4> beside;
   for (int i = 0; i < k_places; ++i) {
     const double along = (i + 0.5) / k_places;
-    places.add(along, -k_surroundings);
-    places.add(1 + k_surroundings, along);
-    places.add(along, 1 + k_surroundings);
-    places.add(-k_surroundings, along);
+    beside[0].add(along, -k_surroundings);
+    beside[1].add(1 + k_surroundings, along);
+    beside[2].add(along, 1 + k_surroundings);
+    beside[3].add(-k_surroundings, along);
   }
-  return reader.light_places(places) >= 4 * k_places * 7 / 8;
+  std::array<bool, 4> is_light{};
+  for (std::size_t side = 0; side < 4; ++side)
+    is_light[side] = reader.light_places(beside[side]) >= k_places - k_dark_places;
+  return is_light;
+}
+
+// Reads codes of which something covers a part of one side, border or paper; the paper beside the other sides
+// must be light.
+void read_beside_broken_side(const QuadReader& reader,
+                             const std::vector<CodeFamily>& families,
+                             Readings* readings) {
+  const std::array<bool, 4> is_light = light_surroundings(reader);
+  const auto dark_sides = std::ranges::count(is_light, false);
+  if (dark_sides > 1) return;
+  for (const CodeFamily& family : families) {
+    if (!can_have_broken_side(family)) continue;
+    const CodeGrid& grid = family.grid;
+    CellSamples samples;
+    reader.read(grid.width, grid.rings, &samples);
+    const Bits bits = bits_of(grid_of(samples, k_middle), grid);
+    bool is_broken = false;  // on one side alone
+    for (std::size_t side = 0; side < 4; ++side)
+      is_broken |= bits.only_breaks(side) && (dark_sides == 0 || !is_light[side]);
+    if (is_broken && is_clear_beside_broken_side(family, bits))
+      read_code(families, family, bits, k_middle, readable_bits(bits, grid.bits, 0), readings);
+  }
 }
 
 std::optional<Identity> read(const QuadReader& reader,
@@ -421,8 +441,10 @@ std::optional<Identity> read(const QuadReader& reader,
   std::pmr::monotonic_buffer_resource memory(buffer.data(), buffer.size());
   Readings readings(certainty, &memory);
   const bool exact = reading == Reading::broken_side;
-  if (exact && !has_light_surroundings(reader)) return std::nullopt;
-  read_codes(reader, families.codes(), reading, &readings);
+  if (exact)
+    read_beside_broken_side(reader, families.codes(), &readings);
+  else
+    read_codes(reader, families.codes(), reading, &readings);
   if (reading == Reading::open) {
     read_barcodes(reader, families, &readings);
     read_templates(reader, families.templates(), &readings);

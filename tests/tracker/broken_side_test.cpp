@@ -77,6 +77,22 @@ TEST(BrokenSide, WithAWrongCellIsNoMarker) {
   }
 }
 
+// Their black cells form figures whose outline breaks a code's border on one side, and its paper on another.
+TEST(BrokenSide, IsNotSeenInMarkersInInvertedColours) {
+  auto rng = test::test_rng();
+  Detector detector(families({"aruco_4x4_50", "apriltag_16h5"}));
+  for (int i = 0; i < 60; ++i) {
+    const MarkerName name{i % 2 ? "apriltag_16h5_inverted" : "aruco_4x4_50_inverted", std::to_string(i / 2)};
+    const PlacedMarker marker =
+        test::placed(pinhole_vga(), name, {320, 240}, uniform(rng, 100, 200), uniform(rng, 0, 6.28),
+                     uniform(rng, 0, 25_deg), uniform(rng, 0, 6.28));
+    const auto light =
+        test::light_of(pinhole_vga(), test::plain(640, 480, 70), std::vector{marker}, {.white = 170}, rng);
+    for (const Detection& found : detector.detect(test::noisy_grey(light, 2, rng)))
+      ADD_FAILURE() << found.marker.text() << " in " << name.text();
+  }
+}
+
 TEST(BrokenSide, IsNotSeenInClutter) {
   auto rng = test::test_rng();
   Detector detector(families({"aruco_4x4_1000", "apriltag_16h5"}));
