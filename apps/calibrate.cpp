@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "calib/capture.h"
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/print.h"
@@ -123,6 +124,10 @@ Status play(const CalibrateOptions& options,
     print_out("{}\n", line);
     std::fflush(stdout);
   };
+  // The size that was entered when these captures were begun counts, unless another one is given now.
+  if (!plan.captures.board_measured) {
+    LIMN_TRY(plan.captures.board_measured, calib::stored_board_measured(plan.captures.folder));
+  }
   LIMN_TRY(plan.captures.board_measured, wizard::measured_board(plan.captures, options.board_measured));
   const wizard::WizardWork work = [&](const wizard::WizardBackend& where,
                                       const wizard::WizardListener& listener) {

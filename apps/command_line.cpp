@@ -383,9 +383,10 @@ void add_solve(CLI::App& app, Run& run) {
   command
       ->add_option(
           "--known-length", options->scale_bar_lengths,
-          "Scale bar: two markers and their measured distance, such as 'apriltag_36h11:3 "
-          "apriltag_36h11:7 250mm', or a marker and its side, such as 'apriltag_36h11:3 40mm'; repeat "
-          "the option for more")
+          "A length that was measured: two markers and their distance, such as 'apriltag_36h11:3 "
+          "apriltag_36h11:7 250mm:0.05' (standard deviation in mm); a marker and its side, such as "
+          "'apriltag_36h11:3 40mm'; or a second board, such as 'charuco:6x5:30mm:aruco_5x5_50'; repeat the "
+          "option for more")
       ->allow_extra_args(false);
   add_board_measured(command, &options->board_measured);
   command->add_flag(

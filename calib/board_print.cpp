@@ -133,6 +133,14 @@ Vector2d print_growth(const Board& board, const Eigen::VectorXd& print) {
   return {2 * print[0] / board.width_m(), 2 * print[1] / board.height_m()};
 }
 
+PrintGrowth expected_growth(const Board& board, const std::optional<BoardMeasured>& measured) {
+  if (board.is_exact) return {};
+  if (!measured) return {0, k_print_size / std::sqrt(2.0)};
+  const Vector2d nominal = nominal_lengths(board);
+  return {(measured->width_m / nominal.x() + measured->height_m / nominal.y()) / 2 - 1,
+          measured->stddev_m * nominal.cwiseInverse().norm() / 2};
+}
+
 double smooth_error_m(const Eigen::VectorXd& print) {
   return print.tail(print.size() - 3).norm() / std::sqrt(2.0);
 }

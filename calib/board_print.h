@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 
 #include "calib/board/board.h"
@@ -44,6 +45,15 @@ Eigen::Matrix<double, k_print_modes, 1> print_stddevs(const Board& board, double
 Eigen::Vector2d print_growth(const Board& board, const Eigen::VectorXd& print);
 /// RMS of the print's smooth errors, m, one coordinate.
 double smooth_error_m(const Eigen::VectorXd& print);
+
+/// By which share a print is larger than the board's text, the mean of its width and height, and the standard
+/// deviation of that.
+struct PrintGrowth {
+  double mean = 0;
+  double stddev = 0;
+};
+/// How much is known of it before anything is observed: of a print of which nothing, or `measured`, is known.
+PrintGrowth expected_growth(const Board& board, const std::optional<BoardMeasured>& measured);
 
 /// Derivatives of the two measured lengths by the parameters; the lengths are means over the rows and columns
 /// of corners.

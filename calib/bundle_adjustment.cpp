@@ -266,7 +266,7 @@ BoardShape BundleAdjuster::shape(const Parameters& at) const {
   return {observations_.board.width_m(), observations_.board.height_m(), at.twist_m};
 }
 
-// The print's prior, and the lengths that were measured by hand.
+// The print's prior, its size by known lengths, and the lengths that were measured by hand.
 void BundleAdjuster::add_print_priors(const Parameters& at, NormalEquations* normal) const {
   const int at_print = board_at_ + 3;
   const double size = options_.print_size > 0 ? options_.print_size : k_print_size;
@@ -275,6 +275,16 @@ void BundleAdjuster::add_print_priors(const Parameters& at, NormalEquations* nor
   normal->cost += off.squaredNorm() / 2;
   normal->devices.block<k_print_modes, k_print_modes>(at_print, at_print).diagonal() += weights.cwiseAbs2();
   normal->gradient.segment<k_print_modes>(at_print) += weights.cwiseProduct(off);
+  if (options_.known_growth) {
+    const PrintModes by = by_print(observations_.board);
+    const Vector2d nominal = nominal_lengths(observations_.board);
+    const Eigen::RowVectorXd slope =
+        (by.row(0) / nominal.x() + by.row(1) / nominal.y()) / 2 / options_.known_growth->stddev;
+    const double residual = slope.dot(at.print) - options_.known_growth->mean / options_.known_growth->stddev;
+    normal->cost += residual * residual / 2;
+    normal->devices.block<k_print_modes, k_print_modes>(at_print, at_print) += slope.transpose() * slope;
+    normal->gradient.segment<k_print_modes>(at_print) += slope.transpose() * residual;
+  }
   if (!options_.board_measured) return;
   const BoardMeasured& measured = *options_.board_measured;
   const PrintModes by = by_print(observations_.board) / measured.stddev_m;
@@ -490,7 +500,7 @@ void BundleAdjuster::index_parameters(const Parameters& of) {
 Result<BundleAdjuster::Summary> BundleAdjuster::minimise(Parameters start,
                                                          const Noise& noise,
                                                          double enough) {
-  const bool solves_print = options_.board_measured || options_.print_size > 0;
+  const bool solves_print = options_.board_measured || options_.known_growth || options_.print_size > 0;
   if (!solves_print) start.print.resize(0);
   if (solves_print && start.print.size() == 0) start.print = VectorXd::Zero(k_print_modes);
   index_parameters(start);

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/json_text.h"
@@ -44,6 +45,15 @@ void add_board_measured(const BoardMeasured& measured, nlohmann::ordered_json* j
 
 Status store_image_now(const std::filesystem::path& path, const cv::Mat& image) {
   return write_png(path, image, {.compression = 1});
+}
+
+Result<std::optional<BoardMeasured>> stored_board_measured(const std::filesystem::path& captures) {
+  const auto path = captures / "capture.json";
+  if (!std::filesystem::exists(path)) return std::optional<BoardMeasured>();
+  LIMN_TRY(const Config config, Config::load(path, "limn.capture/1"));
+  const auto measured = read_board_measured(config.root());
+  LIMN_TRY_STATUS(config.status());
+  return measured;
 }
 
 Status store_board_measured(const std::filesystem::path& captures, const BoardMeasured& measured) {

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 
 #include "calib/capture_set.h"
 #include "core/result.h"
@@ -36,6 +37,8 @@ struct CaptureBackend {
 /// plan_captures (calib/capture_set.h).
 Status begin_captures(const CaptureSet& plan);
 
+/// The board's measured size in the captures' capture.json; none where there is no such file, or no size.
+Result<std::optional<BoardMeasured>> stored_board_measured(const std::filesystem::path& captures);
 /// Adds the board's measured size to the captures' capture.json.
 Status store_board_measured(const std::filesystem::path& captures, const BoardMeasured& measured);
 

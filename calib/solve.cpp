@@ -188,7 +188,7 @@ Result<Solution> rounds(const Observations& observations,
                       tie_point_level(observations, solution.tie_point_residuals)};
     if (is_last) {
       solution.noise = found;
-      solution.print_is_measured = options.board_measured.has_value();
+      solution.print_is_measured = options.board_measured || options.known_growth;
       solution.covariance = joint.covariance(descent.parameters, found);
       break;
     }

@@ -24,6 +24,9 @@ struct SolveOptions {
   /// The print's measured size. When it is given, the print's errors are unknowns of the solve
   /// (calib/board_print.h); without it the board is as its text says.
   std::optional<BoardMeasured> board_measured = {};
+  /// By how much the print is larger than its text, where known lengths showed it (calib/judge/scale_bar.h).
+  /// When it is given, the print's errors are unknowns of the solve.
+  std::optional<PrintGrowth> known_growth = {};
   /// Above 0: the print's errors are unknowns although nobody measured it, and its width and height differ
   /// from its text by this share (standard deviation).
   double print_size = 0;
@@ -60,7 +63,7 @@ struct Solution {
   std::vector<std::optional<Pose>> world_from_board;  ///< for each pose; none where no camera saw the board
   Eigen::Vector2d bend_m = Eigen::Vector2d::Zero();
   double twist_m = 0;
-  bool print_is_measured = false;
+  bool print_is_measured = false;  ///< whether anything was measured that tells the print's size
   Eigen::VectorXd print;  ///< the print's errors (calib/board_print.h); empty where they were not solved
   std::vector<Eigen::Vector2d> corner_residuals, match_residuals;
   std::vector<bool> corner_outlier, match_outlier;  ///< beyond 4 standard deviations

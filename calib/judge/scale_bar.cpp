@@ -2,11 +2,13 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <charconv>
+#include <array>
 #include <cmath>
+#include <cstdlib>
+#include <iterator>
 #include <opencv2/imgproc.hpp>
+#include <regex>
 #include <sstream>
-#include <utility>
 
 #include "calib/code/decode.h"
 #include "calib/surface/triangulate.h"
@@ -282,37 +284,79 @@ void conclude(double widened, ScaleBarCheck* check) {
     squared += std::pow((view.measured_m - check->measured_m) / std::max(view.noise_m, 1e-9), 2);
   const double freedom = static_cast<double>(check->views.size()) - 1;
   const double scatter = freedom > 0 ? std::max(1.0, std::sqrt(squared / freedom)) : 1;
-  check->stddev_m = std::hypot(scatter / std::sqrt(weights), widened * calibration / weights);
+  check->calibration_m = widened * calibration / weights;
+  check->stddev_m = std::hypot(scatter / std::sqrt(weights), check->calibration_m);
+}
+
+// Reads "250mm" or "250mm:0.05".
+bool parse_length(const std::string& text, ScaleBar* known) {
+  static const std::regex k_form(R"((\d+(?:\.\d+)?)(mm|cm|m)(?::(\d+(?:\.\d+)?)(?:mm)?)?)");
+  std::smatch parts;
+  if (text.size() > 40 || !std::regex_match(text, parts, k_form)) return false;
+  const auto number = [&](size_t i) { return std::strtod(parts[i].str().c_str(), nullptr); };
+  known->length_m = number(1) * (parts[2] == "mm" ? 1e-3 : parts[2] == "cm" ? 1e-2 : 1);
+  if (parts[3].matched) known->stddev_m = 1e-3 * number(3);
+  return known->length_m > 0 && known->stddev_m > 0 && known->stddev_m < known->length_m;
+}
+
+bool is_board(const std::string& word) {
+  return std::ranges::any_of(std::array{"charuco:", "chessboard:", "aprilgrid:", "circles:", "acircles:"},
+                             [&](const char* kind) { return word.starts_with(kind); });
+}
+
+// A second board, and its measured size if there is one.
+Result<ScaleBar> parse_board_bar(const std::vector<std::string>& words) {
+  LIMN_TRY(const Board board, Board::parse(words[0]));
+  if (board.is_shifted())
+    return error(
+        "known length '{}': expected a board of rows and columns at right angles, found an asymmetric grid. "
+        "Use a ChArUco board or a chessboard.",
+        words[0]);
+  std::optional<BoardMeasured> measured;
+  if (words.size() > 1) {
+    LIMN_TRY(measured, parse_board_measured(words[1]));
+    LIMN_TRY_STATUS(check_measured(board, *measured));
+  }
+  if (words.size() > 2)
+    return error("known length '{}': expected no more words, found '{}'.", words[0], words[2]);
+  const PrintGrowth growth = expected_growth(board, measured);
+  const double nominal_m = nominal_lengths(board).mean();
+  const std::string name = board.text();
+  return ScaleBar{name, name, nominal_m * (1 + growth.mean), nominal_m * growth.stddev, board};
+}
+
+std::string what_is_believed(const Board& board, const std::optional<BoardMeasured>& measured, bool is_used) {
+  if (is_used) return "The rig's size is the mean that board and lengths give, each by its deviation.";
+  if (board.is_exact) return "The rig keeps the board's size, because its text says that it is exact.";
+  if (measured) return "The rig keeps the board's size, because it was measured, too.";
+  return "The rig keeps the board's size: prints are wrong by some thousandths at most, so one of both "
+         "numbers "
+         "is a mistake, and images do not show which.";
 }
 
 }  // namespace
 
 std::string ScaleBar::text() const {
+  if (board) return "the board " + from;
   return is_side() ? "the side of " + from : fmt::format("{} to {}", from, to);
 }
 
 Result<ScaleBar> parse_scale_bar(const std::string& text) {
-  std::istringstream words(text);
+  std::istringstream stream(text);
+  const std::vector<std::string> words{std::istream_iterator<std::string>(stream), {}};
+  if (!words.empty() && is_board(words[0])) return parse_board_bar(words);
   ScaleBar known;
-  std::string length, surplus;
-  words >> known.from >> known.to;
-  const bool has_two = known.to.find(':') != std::string::npos;
-  if (has_two)
-    words >> length;
-  else
-    length = std::exchange(known.to, known.from);
-  double value = 0;
-  const auto [rest, problem] = std::from_chars(length.data(), length.data() + length.size(), value);
-  const std::string unit = rest;  // the text is zero-terminated
-  const double factor = unit == "mm" ? 1e-3 : unit == "cm" ? 1e-2 : unit == "m" ? 1 : 0;
-  known.length_m = value * factor;
-  if (words.fail() || words >> surplus || problem != std::errc() || !(known.length_m > 0) ||
-      !std::isfinite(known.length_m) || (has_two && known.from == known.to))
-    return error(
-        "known length '{}': expected two markers and their distance, such as 'apriltag_36h11:3 "
-        "apriltag_36h11:7 250mm', or a marker and its side, such as 'apriltag_36h11:3 40mm'.",
-        text);
-  return known;
+  if (words.size() == 2 || words.size() == 3) {
+    known.from = words[0];
+    known.to = words[words.size() - 2];
+    if (parse_length(words.back(), &known) && (words.size() == 2 || known.from != known.to)) return known;
+  }
+  return error(
+      "known length '{}': expected two markers and their distance, such as 'apriltag_36h11:3 "
+      "apriltag_36h11:7 250mm', a marker and its side, such as 'apriltag_36h11:3 40mm', or a second board, "
+      "such as 'charuco:6x5:30mm:aruco_5x5_50'; behind a length its standard deviation in mm, if it is not "
+      "0.1, such as 250mm:0.05.",
+      text);
 }
 
 Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures,
@@ -346,7 +390,43 @@ Result<std::vector<ScaleBarCheck>> measure_scale_bars(const CaptureSet& captures
   return checks;
 }
 
-std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board) {
+std::optional<PrintGrowth> growth_by_lengths(const std::vector<ScaleBarCheck>& checks, double assumed) {
+  double weights = 0, sum = 0, calibration = 0, squared = 0;
+  std::vector<PrintGrowth> each;  // with each length's own error alone
+  for (const ScaleBarCheck& check : checks) {
+    if (check.views.empty()) continue;
+    const double share = check.known.length_m / check.measured_m;
+    const double own_m =
+        std::sqrt(std::max(0.0, check.stddev_m * check.stddev_m - check.calibration_m * check.calibration_m));
+    each.push_back(
+        {(1 + assumed) * share - 1,
+         share * std::hypot(own_m / check.measured_m, check.known.stddev_m / check.known.length_m)});
+    const double weight = 1 / std::pow(std::max(each.back().stddev, 1e-9), 2);
+    weights += weight;
+    sum += weight * each.back().mean;
+    calibration += weight * check.calibration_m / check.measured_m;
+  }
+  if (each.empty()) return std::nullopt;
+  const double mean = sum / weights;
+  for (const PrintGrowth& one : each) squared += std::pow((one.mean - mean) / std::max(one.stddev, 1e-9), 2);
+  const double freedom = static_cast<double>(each.size()) - 1;
+  const double scatter = freedom > 0 ? std::max(1.0, std::sqrt(squared / freedom)) : 1;
+  return PrintGrowth{mean, std::hypot(scatter / std::sqrt(weights), calibration / weights)};
+}
+
+bool may_be_growth(const PrintGrowth& expected, const PrintGrowth& found) {
+  constexpr double k_largest = 0.01;  // of a print, if nobody scaled it
+  const double difference = std::abs(found.mean - expected.mean);
+  const bool is_unmeasured = expected.stddev > k_print_size / 2;
+  return difference <= (is_unmeasured
+                            ? k_largest
+                            : std::max(k_scale_tolerance, 3 * std::hypot(expected.stddev, found.stddev)));
+}
+
+std::optional<Fault> scale_fault(const ScaleBarCheck& check,
+                                 const Board& board,
+                                 const std::optional<BoardMeasured>& measured,
+                                 bool is_used) {
   const ScaleBar& known = check.known;
   const std::string name = known.text();
   if (check.views.empty())
@@ -354,16 +434,31 @@ std::optional<Fault> scale_fault(const ScaleBarCheck& check, const Board& board)
                  fmt::format("in no pose is {} seen whole by a camera and lit by a projector", name),
                  "place it where a camera sees it and a projector lights it", Severity::note};
   const double difference = check.measured_m - known.length_m, share = difference / known.length_m;
-  if (std::abs(difference) <= 3 * check.stddev_m || std::abs(share) <= k_scale_tolerance) return std::nullopt;
+  const double stddev_m = std::hypot(check.stddev_m, known.stddev_m);
+  if (std::abs(difference) <= 3 * stddev_m || std::abs(share) <= k_scale_tolerance) return std::nullopt;
   return Fault{
       FaultName::wrong_scale,
       fmt::format("{} is {:.2f} mm long, but {:.2f} mm (standard deviation {:.2f} mm) were measured in {} "
-                  "views ({:+.2f} %)",
-                  name, 1e3 * known.length_m, 1e3 * check.measured_m, 1e3 * check.stddev_m,
-                  check.views.size(), 100 * share),
+                  "views ({:+.2f} %). {}",
+                  name, 1e3 * known.length_m, 1e3 * check.measured_m, 1e3 * stddev_m, check.views.size(),
+                  100 * share, what_is_believed(board, measured, is_used)),
       fmt::format(
-          "measure the board: its squares seem to be {:.3f} mm instead of {:g} mm; or measure the bar again",
-          1e3 * board.square_m / (1 + share), 1e3 * board.square_m)};
+          "measure the board: its squares seem to be {:.3f} mm instead of {:g} mm; or measure {} again",
+          1e3 * board.square_m / (1 + share), 1e3 * board.square_m, name)};
+}
+
+std::optional<Fault> growth_note(const PrintGrowth& found, const Board& board) {
+  if (std::abs(found.mean) <= std::max(k_scale_tolerance, 3 * found.stddev)) return std::nullopt;
+  return Fault{
+      FaultName::wrong_scale,
+      fmt::format("the board is {:+.2f} % larger than its text says, by the known lengths (standard "
+                  "deviation {:.2f} %). They are believed and part of the solve, because prints are "
+                  "often wrong by so much, measured lengths are not",
+                  100 * found.mean, 100 * found.stddev),
+      fmt::format("describe the board with squares of {:.3f} mm instead of {:g} mm, or print it again "
+                  "without scaling",
+                  1e3 * board.square_m * (1 + found.mean), 1e3 * board.square_m),
+      Severity::note};
 }
 
 }  // namespace limn::calib

@@ -423,6 +423,7 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
                    [](const calib::Fault& f) { return f.name == calib::FaultName::wrong_scale; });
   ASSERT_NE(fault, wrong->assessment.faults.end());
   EXPECT_NE(fault->advice.find("instead of 39 mm"), std::string::npos) << fault->advice;
+  EXPECT_NE(fault->evidence.find("The rig keeps the board's size"), std::string::npos) << fault->evidence;
   EXPECT_NE(wrong->assessment.verdict, calib::Verdict::good);
 
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:8 250mm"};
@@ -430,8 +431,89 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   ASSERT_TRUE(unseen.ok()) << unseen.message();
   EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::scale_bar_not_seen);
   for (const char* nonsense :
-       {"", "apriltag_36h11:3", "250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm"})
+       {"", "apriltag_36h11:3", "250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm", "a:1 b:2 30mm:0",
+        "charuco:6x5", "charuco:6x5:30mm 40mm", "charuco:6x5:30mm 120x90mm x", "acircles:4x11:20mm"})
     EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
+}
+
+// A rig's size: the distance between its camera and its projector.
+double baseline_m(const Rig& rig) {
+  return (rig.cameras[0].imager_from_world.inverse().translation -
+          rig.projectors[0].imager_from_world.inverse().translation)
+      .norm();
+}
+
+// The print is 0.38 % larger than its text says, as prints may be. Known lengths are believed then, and the
+// rig gets their size; what the statement of the size is follows from them.
+TEST(SolveCommand, AKnownLengthGivesTheRigItsSizeWhereThePrintIsALittleTooLarge) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "rig of bar";
+  const BoardAndProjector truth;
+  const calib::CaptureSet plan = calib::plan_captures(
+      captures, {{truth.camera.name, truth.camera.width, truth.camera.height}},
+      {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
+  for (const int pose : {6, 7, 8}) truth.capture_bar(plan, pose);
+  wizard::SolveCommandOptions options{.captures = captures, .out = out};
+  const auto exact = wizard::solve_captures(options);
+  ASSERT_TRUE(exact.ok()) << exact.message();
+  const double true_m = baseline_m(exact->solution.rig);
+
+  std::string described = read_file(captures / "capture.json").value();
+  described.replace(described.find("charuco:8x6:40mm"), 16, "charuco:8x6:39.85mm");
+  ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
+  const auto blind = wizard::solve_captures(options);
+  ASSERT_TRUE(blind.ok()) << blind.message();
+  EXPECT_NEAR(baseline_m(blind->solution.rig) / true_m, 39.85 / 40, 2e-4);
+
+  options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm:0.05"};
+  const auto right = wizard::solve_captures(options);
+  ASSERT_TRUE(right.ok()) << right.message();
+  ASSERT_EQ(right->scale_bar_lengths.size(), 1U);
+  const calib::ScaleBarCheck& check = right->scale_bar_lengths[0];
+  EXPECT_NEAR(baseline_m(right->solution.rig) / true_m, 1, 3 * check.stddev_m / 0.25);
+  EXPECT_LT(check.stddev_m, 0.25 * 0.001);
+  EXPECT_TRUE(right->solution.print_is_measured);
+  const auto note =
+      std::ranges::find(right->assessment.faults, calib::FaultName::wrong_scale, &calib::Fault::name);
+  ASSERT_NE(note, right->assessment.faults.end());
+  EXPECT_EQ(note->severity, calib::Severity::note);
+  EXPECT_NE(note->evidence.find("They are believed"), std::string::npos) << note->evidence;
+}
+
+// A chessboard that is known to be exact beside the board, whose text says 0.38 % less than is printed.
+TEST(SolveCommand, ASecondBoardGivesTheRigItsSize) {
+  const fs::path captures = own_captures(), out = captures.parent_path() / "rig of two boards";
+  const BoardAndProjector truth;
+  const calib::CaptureSet plan = calib::plan_captures(
+      captures, {{truth.camera.name, truth.camera.width, truth.camera.height}},
+      {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
+  wizard::SolveCommandOptions options{.captures = captures, .out = out};
+  const auto exact = wizard::solve_captures(options);
+  ASSERT_TRUE(exact.ok()) << exact.message();
+  const auto second = calib::draw_board(calib::Board::parse("chessboard:6x5:35mm").value());
+  for (const int pose : {6, 7, 8}) truth.capture_seen(plan, pose, truth.samples(pose, true, second));
+  std::string described = read_file(captures / "capture.json").value();
+  described.replace(described.find("charuco:8x6:40mm"), 16, "charuco:8x6:39.85mm");
+  ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
+
+  options.scale_bar_lengths = {"chessboard:6x5:35mm:exact"};
+  const auto right = wizard::solve_captures(options);
+  ASSERT_TRUE(right.ok()) << right.message();
+  ASSERT_EQ(right->scale_bar_lengths.size(), 1U);
+  EXPECT_EQ(right->scale_bar_lengths[0].views.size(), 3U);
+  EXPECT_NEAR(baseline_m(right->solution.rig) / baseline_m(exact->solution.rig), 1, 1e-3);
+  EXPECT_EQ(right->scale_rests_on, "known_length");
+  EXPECT_EQ(right->explanation.verdict.find("nothing has checked"), std::string::npos);
+
+  // Of two prints each is as uncertain as the other: the rig's size is the mean of both.
+  options.scale_bar_lengths = {"chessboard:6x5:35mm"};
+  const auto between = wizard::solve_captures(options);
+  ASSERT_TRUE(between.ok()) << between.message();
+  EXPECT_NEAR(baseline_m(between->solution.rig) / baseline_m(exact->solution.rig), 1 - 0.00375 / 2, 1e-3);
+
+  options.scale_bar_lengths = {"charuco:8x6:30mm"};
+  const auto same = wizard::solve_captures(options);
+  ASSERT_FALSE(same.ok());
+  EXPECT_NE(same.message().find("another dictionary"), std::string::npos) << same.message();
 }
 
 // Each pose has the stripes of another pose: nothing fits together.

@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "calib/judge/assess.h"
+#include "calib/judge/scale_bar.h"
 #include "calib/measurement_model.h"
 #include "calib/solve.h"
 #include "tests/calib/bad_print.h"
@@ -166,6 +168,68 @@ TEST(BoardPrint, AnUnevenPrintShowsWithoutLengthsAndUnevenPixelsAreNotTakenForOn
     EXPECT_GT(share_within(ratios, 1), 0.9);
     EXPECT_LT(rms(solved), rms(exact));
   }
+}
+
+// A known length, of 250 mm to 0.05 mm, beside a print whose mean size nobody measured.
+TEST(BoardPrint, AKnownLengthMakesUpForTheSizeOfABadPrint) {
+  std::mt19937_64 rng = test_rng();
+  constexpr double k_stddev = 2e-4;
+  constexpr std::array k_errors = {0.32, -1.15, 1.15,
+                                   -0.32};  // the middles of a normal distribution's quarters
+  std::vector<double> with, without, ratios;
+  for (unsigned seed = 1; seed <= 4; ++seed) {
+    const BadPrint print{.phase = 0.9 * seed};
+    const Printed made = printed(print, seed, &rng);
+    const Vector2d sizes =
+        print.lengths(made.truth.board).cwiseQuotient(calib::nominal_lengths(made.truth.board));
+    const calib::PrintGrowth growth{sizes.mean() - 1 + k_errors[seed - 1] * k_stddev, k_stddev};
+    const Judged known = judged(made, {.known_growth = growth, .square_pixels = true}, &rng);
+    for (const double e : known.landed.pooled_mm()) {
+      with.push_back(e);
+      ratios.push_back(e / known.stated_mm);
+    }
+    for (const double e : judged(made, {}, &rng).landed.pooled_mm()) without.push_back(e);
+  }
+  printf("[ print    ] size to %.2f %%: %.3f mm RMS, holds for %.1f %%; without %.3f mm\n", 100 * k_stddev,
+         rms(with), 100 * share_within(ratios, 1), rms(without));
+  EXPECT_LT(rms(with), 0.5 * rms(without));
+  EXPECT_GT(share_within(ratios, 1), 0.9);
+}
+
+TEST(BoardPrint, KnownLengthsShowTheSizeOfThePrintByTheirDeviations) {
+  const auto seen = [](double length_m, double measured_m, double stddev_m) {
+    calib::ScaleBarCheck check;
+    check.known = {"a:1", "a:2", length_m, 1e-6};
+    check.views.resize(1);
+    check.measured_m = measured_m;
+    check.stddev_m = stddev_m;
+    return check;
+  };
+  EXPECT_FALSE(calib::growth_by_lengths({calib::ScaleBarCheck()}, 0).has_value());
+  // The rig shows 100 mm as 99.8: the print is larger by 0.2 % than the rig takes it for.
+  const auto one = calib::growth_by_lengths({seen(0.1, 0.0998, 1e-4)}, 0.001);
+  ASSERT_TRUE(one.has_value());
+  EXPECT_NEAR(one->mean, 0.003, 1e-5);
+  EXPECT_NEAR(one->stddev, 1e-3, 2e-5);
+  const auto both = calib::growth_by_lengths({seen(0.1, 0.0998, 1e-4), seen(0.2, 0.1998, 1e-4)}, 0);
+  ASSERT_TRUE(both.has_value());
+  EXPECT_NEAR(both->mean, (0.002 + 4 * 0.001) / 5, 1e-5);
+  EXPECT_NEAR(both->stddev, 1e-3 / std::sqrt(5.0), 2e-5);
+  const auto torn = calib::growth_by_lengths({seen(0.1, 0.099, 1e-4), seen(0.1, 0.101, 1e-4)}, 0);
+  ASSERT_TRUE(torn.has_value());
+  EXPECT_NEAR(torn->stddev, 1e-2, 1e-3);  // they differ by ten times what they state
+}
+
+TEST(BoardPrint, ALengthIsBelievedWhereAPrintMayBeSoWrong) {
+  const calib::Board board = calib::Board::parse("charuco:10x7:25mm").value();
+  const calib::PrintGrowth nobody = calib::expected_growth(board, std::nullopt),
+                           by_hand = calib::expected_growth(board, BoardMeasured{0.2002, 0.1251, 5e-5});
+  EXPECT_NEAR(nobody.stddev, 0.003 / std::sqrt(2.0), 1e-9);
+  EXPECT_NEAR(by_hand.mean, (0.001 + 0.0008) / 2, 1e-9);
+  EXPECT_TRUE(calib::may_be_growth(nobody, {0.008, 1e-4}));
+  EXPECT_FALSE(calib::may_be_growth(nobody, {-0.03, 1e-3}));
+  EXPECT_TRUE(calib::may_be_growth(by_hand, {0.002, 1e-4}));
+  EXPECT_FALSE(calib::may_be_growth(by_hand, {0.006, 1e-4}));
 }
 
 TEST(BoardPrint, ABoardGluedFromTwoSheetsIsNamed) {

@@ -59,7 +59,14 @@ TEST(CaptureSet, AreReadBackAsTheyWereTaken) {
 
 TEST(CaptureSet, AreNeverMixedWithOlderOnes) {
   const fs::path folder = test::test_folder() / "captures";
+  EXPECT_FALSE(stored_board_measured(folder).value().has_value());
   ASSERT_TRUE(begin_captures(small_plan(folder)).ok());
+  EXPECT_FALSE(stored_board_measured(folder).value().has_value());
+  ASSERT_TRUE(store_board_measured(folder, {0.2, 0.15, 5e-5}).ok());
+  const auto stored = stored_board_measured(folder).value();
+  ASSERT_TRUE(stored.has_value());
+  EXPECT_NEAR(stored->width_m, 0.2, 1e-12);
+  EXPECT_NEAR(stored->stddev_m, 5e-5, 1e-12);
   EXPECT_NE(begin_captures(small_plan(folder)).message().find("capture.json"), std::string::npos);
 }
 

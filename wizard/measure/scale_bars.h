@@ -7,8 +7,9 @@
 
 namespace limn::wizard {
 
-/// The scale bars' markers as the tracker finds them, for every pose and camera: each marker in the white
-/// image of the first projector that shows it. Error: an unknown family.
+/// The scale bars' markers as the tracker finds them, and their boards where all four outermost corners are
+/// seen, for every pose and camera: each marker in the white image of the first projector that shows it.
+/// Errors: an unknown family; a second board whose markers are those of the first.
 Result<std::vector<calib::DetectedMark>> scale_bar_marks(const calib::CaptureSet& captures,
                                                          const Rig& rig,
                                                          const std::vector<calib::ScaleBar>& lengths);

@@ -70,27 +70,70 @@ Status solve_uneven_print(const calib::Observations& observations,
   return {};
 }
 
-// Measures the scale bars. A wrong length is a fault, and a rig with a fault of scale is never "good".
+// Measures the known lengths with the solved rig as if the print's size were known exactly, and solves again
+// with what they show of it. Leaves the solution as it is where they contradict the board by more than prints
+// are wrong.
+Status use_lengths(const calib::CaptureSet& captures,
+                   const calib::Observations& observations,
+                   const std::vector<calib::ScaleBar>& lengths,
+                   const std::vector<calib::DetectedMark>& marks,
+                   const SolveCommandOptions& options,
+                   calib::SolveOptions* solving,
+                   calib::ModelSelection* choice) {
+  const calib::Board& board = captures.board;
+  if (marks.empty() || board.is_exact) return {};
+  double assumed = 0;
+  calib::Solution fixed = choice->solution;
+  if (fixed.print.size() > 0) {
+    constexpr double k_known = 1e-7;
+    assumed = calib::print_growth(board, fixed.print).mean();
+    calib::SolveOptions of_known_size = *solving;
+    of_known_size.known_growth = {assumed, k_known};
+    LIMN_TRY(fixed, calib::solve_from(observations, of_known_size, fixed));
+  }
+  LIMN_TRY(const auto checks, calib::measure_scale_bars(captures, fixed, marks, lengths));
+  const auto found = calib::growth_by_lengths(checks, assumed);
+  if (!found || !calib::may_be_growth(calib::expected_growth(board, solving->board_measured), *found))
+    return {};
+  solving->known_growth = found;
+  solving->square_pixels = !options.pixels_not_square;
+  solving->lens_models.clear();
+  LIMN_TRY(*choice, calib::solve_selecting_models(observations, *solving));
+  *solving = choice->options;
+  return {};
+}
+
+// Measures the known lengths. A wrong length is a fault, and a rig with a fault of scale is never "good".
 Status check_lengths(const calib::CaptureSet& captures,
                      const std::vector<calib::ScaleBar>& lengths,
+                     const std::vector<calib::DetectedMark>& marks,
+                     const calib::SolveOptions& solving,
                      calib::Report* report) {
   if (lengths.empty()) return {};
-  LIMN_TRY(const auto marks, scale_bar_marks(captures, report->solution.rig, lengths));
   const double widened = std::max(1.0, report->assessment.normalised_residuals.held_out.stddev);
   LIMN_TRY(report->scale_bar_lengths,
            calib::measure_scale_bars(captures, report->solution, marks, lengths, widened));
   for (const calib::ScaleBarCheck& check : report->scale_bar_lengths) {
-    if (const auto fault = calib::scale_fault(check, captures.board))
+    if (const auto fault = calib::scale_fault(check, captures.board, solving.board_measured,
+                                              solving.known_growth.has_value()))
       calib::add_faults({*fault}, &report->assessment);
   }
+  if (!solving.known_growth) return {};
+  if (const auto note = calib::growth_note(*solving.known_growth, captures.board))
+    calib::add_faults({*note}, &report->assessment);
   return {};
 }
 
-// Whether the side of a marker, or the distance of two, was measured.
-bool is_any_seen(const std::vector<calib::ScaleBarCheck>& checks, bool is_side) {
-  return std::any_of(checks.begin(), checks.end(), [&](const calib::ScaleBarCheck& check) {
-    return !check.views.empty() && check.known.is_side() == is_side;
-  });
+// What the rig's scale rests on, as docs/formats.md names it; a second board is a known length.
+std::string scale_rests_on(const std::vector<calib::ScaleBarCheck>& checks, bool is_board_measured) {
+  const auto is_any_seen = [&](bool is_marker) {
+    return std::ranges::any_of(checks, [&](const calib::ScaleBarCheck& check) {
+      return !check.views.empty() && (check.known.is_side() && !check.known.board) == is_marker;
+    });
+  };
+  if (is_board_measured) return "board_measured";
+  if (is_any_seen(false)) return "known_length";
+  return is_any_seen(true) ? "markers" : "board";
 }
 
 // The error of a failed solve with the faults that explain it, which are also written to report.json.
@@ -163,6 +206,11 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
   solving = choice->options;
   LIMN_TRY_STATUS(solve_uneven_print(observed.observations, options, &solving, &*choice));
+  std::vector<calib::DetectedMark> marks;
+  if (!lengths.empty()) {
+    LIMN_TRY(marks, scale_bar_marks(captures, choice->solution.rig, lengths));
+  }
+  LIMN_TRY_STATUS(use_lengths(captures, observed.observations, lengths, marks, options, &solving, &*choice));
   calib::Solution* const solution = &choice->solution;
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} iterations; measuring the held-out error", solution->iterations);
@@ -180,10 +228,8 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
                         {"total", seconds_since(begun)}},
                        std::move(choice->trials)};
   LIMN_TRY_STATUS(measure_vignetting(captures, report, &response.responses));
-  LIMN_TRY_STATUS(check_lengths(captures, lengths, &report));
-  if (is_any_seen(report.scale_bar_lengths, true)) report.scale_rests_on = "markers";
-  if (is_any_seen(report.scale_bar_lengths, false)) report.scale_rests_on = "known_length";
-  if (measured) report.scale_rests_on = "board_measured";
+  LIMN_TRY_STATUS(check_lengths(captures, lengths, marks, solving, &report));
+  report.scale_rests_on = scale_rests_on(report.scale_bar_lengths, measured.has_value());
   const bool is_scale_checked = captures.board.is_exact || report.scale_rests_on != "board";
   report.explanation = calib::explain(report.observed, report.solution, report.assessment, is_scale_checked);
   report.made_at = time_now();
