@@ -415,7 +415,7 @@ std::optional<PrintGrowth> growth_by_lengths(const std::vector<ScaleBarCheck>& c
 }
 
 bool may_be_growth(const PrintGrowth& expected, const PrintGrowth& found) {
-  constexpr double k_largest = 0.01;  // of a print, if nobody scaled it
+  constexpr double k_largest = 0.01;  // prints differ by so much at most, if nobody scaled them
   const double difference = std::abs(found.mean - expected.mean);
   const bool is_unmeasured = expected.stddev > k_print_size / 2;
   return difference <= (is_unmeasured

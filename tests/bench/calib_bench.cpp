@@ -42,6 +42,8 @@ struct Case {
   std::optional<BadPrint> print = {};  ///< none: the print is exact
   double twist_m = 0;
   double shake_px = 0, flicker = 0;
+  /// sRGB camera with JPEG images, vignetting of both devices, more noise, twice the defocus, black light.
+  bool is_rough = false;
 };
 
 std::vector<Case> all_cases() {
@@ -68,6 +70,20 @@ std::vector<Case> all_cases() {
   for (unsigned draw = 1; draw <= 5; ++draw)
     cases.push_back({draw == 1 ? "ill-posed" : fmt::format("ill-posed-{}", draw),
                      {.k1 = -0.05, .shift = 0.5, .tilt = 0.05, .spread = 0.15, .seed = 4 + 20 * (draw - 1)}});
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    cases.push_back({.name = fmt::format("all-effects-{}", seed),
+                     .options = {.k1 = -0.05,
+                                 .shift = 0.5,
+                                 .bow_m = 0.4e-3,
+                                 .square_pixels = true,
+                                 .quarter_turns = true,
+                                 .seed = seed + 7},
+                     .print = BadPrint{.phase = 0.9 * seed + 0.4},
+                     .twist_m = 0.4e-3,
+                     .shake_px = 0.2,
+                     .flicker = 0.015,
+                     .is_rough = true});
+  }
   cases.push_back({.name = "shaken",
                    .options = {.k1 = -0.05, .shift = 0.5, .seed = 2},
                    .shake_px = 0.2,
@@ -129,7 +145,23 @@ sim::World world_of(const Case& test_case, const TrueRig& truth) {
   world.projector_effects = {
       {.illuminance_at_1m = 1.7, .gamma = 2.2, .black_level = 0.002, .focus_m = 1.3, .aperture_m = 0.01}};
   world.room.ambient = 0.05;
+  if (!test_case.is_rough) return world;
+  sim::CameraEffects& camera = world.camera_effects[0];
+  camera.srgb = true;
+  camera.vignetting = 0.3;
+  camera.full_well_e = 10000;
+  camera.psf_px = 0.9;
+  sim::ProjectorEffects& projector = world.projector_effects[0];
+  projector.vignetting = 0.3;
+  projector.black_level = 0.01;
+  projector.aperture_m = 0.02;
   return world;
+}
+
+cv::Mat through_jpeg(const cv::Mat& image) {
+  std::vector<uchar> bytes;
+  cv::imencode(".jpg", image, bytes, {cv::IMWRITE_JPEG_QUALITY, 90});
+  return cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
 }
 
 Result<calib::CaptureSet> captured(const Case& test_case, const TrueRig& truth, const fs::path& folder) {
@@ -146,13 +178,15 @@ Result<calib::CaptureSet> captured(const Case& test_case, const TrueRig& truth, 
     world.objects = {bowed_board(truth, test_case.print, truth.world_from_board[pose])};
     const sim::Samples samples = sim::trace(world, 0);
     cv::Mat shown;
-    const calib::CaptureBackend backend{.show = [&](int, const cv::Mat& image) -> Status {
-                                          shown = image.clone();
-                                          return {};
-                                        },
-                                        .grab = [&](int) -> Result<cv::Mat> {
-                                          return sim::photograph(world, samples, {&shown, 1}, seed++);
-                                        }};
+    const calib::CaptureBackend backend{
+        .show = [&](int, const cv::Mat& image) -> Status {
+          shown = image.clone();
+          return {};
+        },
+        .grab = [&](int) -> Result<cv::Mat> {
+          const cv::Mat image = sim::photograph(world, samples, {&shown, 1}, seed++);
+          return test_case.is_rough ? through_jpeg(image) : image;
+        }};
     LIMN_TRY_STATUS(calib::capture_pose(plan, static_cast<int>(pose), backend));
   }
   cv::imwrite((folder / "complete.png").string(), cv::Mat::zeros(1, 1, CV_8U));
