@@ -9,6 +9,7 @@
 #include "calib/judge/assess.h"
 #include "calib/model_selection.h"
 #include "core/median.h"
+#include "tests/calib/bad_print.h"
 #include "tests/calib/true_rig.h"
 
 namespace limn::test {
@@ -23,6 +24,10 @@ struct Group {
   double bow_m = 0;       // the same in all poses
   double sag_mm = 0;      // standard deviation of a bend that each pose has by itself
   bool is_sharp = false;  // noise of good images instead of a drawn one
+  double twist_m = 0;
+  bool is_badly_printed = false;  // 0.15 % unequal, 0.1 mm smooth errors
+  bool has_quarter_turns = false;
+  double length_stddev_m = 0;  // above 0: the print was measured to this
 };
 
 const std::vector<Group> k_groups = {
@@ -32,6 +37,13 @@ const std::vector<Group> k_groups = {
     {.name = "sharp images", .poses = 12, .is_sharp = true},
     {.name = "bowed", .bow_m = 0.4e-3},
     {.name = "sagging", .sag_mm = 0.2},
+    {.name = "twisted", .bow_m = 0.4e-3, .twist_m = 0.4e-3},
+    {.name = "badly printed", .poses = 12, .is_badly_printed = true},
+    {.name = "badly printed, quarter turns",
+     .poses = 12,
+     .is_badly_printed = true,
+     .has_quarter_turns = true},
+    {.name = "badly printed, measured", .poses = 12, .is_badly_printed = true, .length_stddev_m = 0.03e-3},
     {.name = "almost parallel", .tilt = 0.06},
     {.name = "almost parallel, in the middle", .tilt = 0.06, .spread = 0.15},
 };
@@ -56,6 +68,8 @@ Drawn drawn(const Group& group, unsigned seed) {
               .tilt = group.tilt * between(0.8, 1.2),
               .spread = group.spread,
               .asunder = between(0.3, 0.6),
+              .square_pixels = group.is_badly_printed,
+              .quarter_turns = group.has_quarter_turns,
               .seed = seed};
   made.corner_px = group.is_sharp ? 0.01 : between(0.015, 0.1);
   made.match_px = group.is_sharp ? 0.02 : between(0.03, 0.12);
@@ -91,21 +105,41 @@ struct Tally {
   int rigs = 0, unsolved = 0;
 };
 
+// As limn solve does it: again with the print's errors as unknowns where they show.
+Result<calib::ModelSelection> solved(const calib::Observations& observations, calib::SolveOptions options) {
+  LIMN_TRY(auto choice, calib::solve_selecting_models(observations, options));
+  const calib::UnevenPrint print = calib::uneven_print(observations, choice.options, choice.solution);
+  if (print.size == 0) return choice;
+  options.print_size = print.size;
+  options.square_pixels = print.are_pixels_square;
+  return calib::solve_selecting_models(observations, options);
+}
+
 void run(const Group& group, unsigned seed, Tally* tally) {
   const Drawn draw = drawn(group, seed);
-  const TrueRig truth = make_true_rig(draw.rig);
+  TrueRig truth = make_true_rig(draw.rig);
+  truth.twist_m = group.twist_m;
   std::mt19937_64 rng(seed + 1000);
   calib::Observations observations = sagging(truth, group.sag_mm, &rng);
+  calib::SolveOptions options{.camera_model = calib::k_auto_lens, .projector_model = calib::k_auto_lens};
+  if (group.is_badly_printed) {
+    const BadPrint print{.phase = 0.9 * seed};
+    print_corners(truth, print, &observations);
+    std::normal_distribution<double> error(0, group.length_stddev_m);
+    const Eigen::Vector2d lengths = print.lengths(truth.board) + Eigen::Vector2d(error(rng), error(rng));
+    if (group.length_stddev_m > 0) options.board_measured = {lengths.x(), lengths.y(), group.length_stddev_m};
+    options.square_pixels = options.board_measured.has_value();
+  }
   add_noise(draw.corner_px, draw.match_px, &rng, &observations);
   for (calib::Match& match : observations.matches) match.stddev_px = draw.match_px;
-  const auto choice = calib::solve_selecting_models(
-      observations, {.camera_model = calib::k_auto_lens, .projector_model = calib::k_auto_lens});
+  const auto choice = solved(observations, options);
   if (!choice) {
     ++tally->unsolved;
     return;
   }
   const double stated =
-      calib::assess({observations, {}, {}, 0, 0}, choice->solution, choice->held_out).predicted_error_mm[0];
+      calib::assess({observations, {}, {}, 0, 0}, choice->solution, choice->held_out, choice->options)
+          .predicted_error_mm[0];
   const double pnp_px = std::max(0.02, draw.corner_px);  // the prototype is measured as well as the board
   std::vector<double> all;
   for (const Prototype prototype : {Prototype::panel, Prototype::cluster, Prototype::concave}) {

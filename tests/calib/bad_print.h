@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "calib/board/board.h"
+#include "calib/measurement_model.h"
+#include "tests/calib/true_rig.h"
 
 namespace limn::test {
 
@@ -36,5 +38,17 @@ struct BadPrint {
     return sum;
   }
 };
+
+// Moves the observed corners to where they are on this print.
+inline void print_corners(const TrueRig& truth, const BadPrint& print, calib::Observations* observations) {
+  const calib::Board& board = truth.board;
+  for (calib::CornerObservation& seen : observations->corners) {
+    const Imager& camera = truth.rig.cameras[static_cast<size_t>(seen.camera)];
+    calib::predict_corner({camera.lens.model, camera.lens.values, camera.imager_from_world},
+                          truth.world_from_board[static_cast<size_t>(seen.pose)],
+                          {board.width_m(), board.height_m(), truth.twist_m}, truth.bow_m,
+                          print.at(board, board.p_corner(seen.corner).head<2>()), &seen.px);
+  }
+}
 
 }  // namespace limn::test

@@ -9,7 +9,6 @@
 
 #include "calib/judge/assess.h"
 #include "calib/judge/scale_bar.h"
-#include "calib/measurement_model.h"
 #include "calib/solve.h"
 #include "tests/calib/bad_print.h"
 #include "tests/calib/true_rig.h"
@@ -37,18 +36,10 @@ Printed printed(const BadPrint& print, unsigned seed, std::mt19937_64* rng, bool
                               .square_pixels = true,
                               .quarter_turns = has_turns,
                               .seed = seed});
-  const Imager& camera = made.truth.rig.cameras[0];
   made.truth.bow_m = {k_bend_m, 0};
   made.truth.twist_m = k_bend_m;
   made.observations = observed_perfectly(made.truth, 4);
-  const calib::Board& board = made.truth.board;
-  for (calib::CornerObservation& corner : made.observations.corners) {
-    EXPECT_TRUE(calib::predict_corner({camera.lens.model, camera.lens.values, camera.imager_from_world},
-                                      made.truth.world_from_board[static_cast<size_t>(corner.pose)],
-                                      {board.width_m(), board.height_m(), made.truth.twist_m},
-                                      made.truth.bow_m,
-                                      print.at(board, board.p_corner(corner.corner).head<2>()), &corner.px));
-  }
+  print_corners(made.truth, print, &made.observations);
   add_noise(0.015, 0.03, rng, &made.observations);
   for (calib::Match& match : made.observations.matches) match.stddev_px = 0.03;
   return made;
