@@ -406,7 +406,7 @@ std::string row(const Landed& errors) {
 // The rig on all prototypes; `stated_mm` 0: not stated.
 void print_rows(const std::string& name, const TrueRig& truth, const Rig& rig, double stated_mm) {
   std::vector<double> pooled;
-  fmt::print("  {:<34}", name);
+  fmt::print("  {:<52}", name);
   for (const Prototype prototype : {Prototype::panel, Prototype::cluster, Prototype::concave}) {
     std::mt19937_64 rng(17);
     const Landed errors = landed(truth, rig, prototype_mesh(prototype), k_pnp_px, k_points, &rng);
@@ -429,15 +429,17 @@ Status run_paper(const Case& test_case, const fs::path& folder) {
   const Vector2d lengths = 1e3 * test_case.print->lengths(truth.board);
   for (const double stddev_mm : {0.03, 0.1, 0.0}) {
     std::normal_distribution<double> error(0, stddev_mm > 0 ? stddev_mm : 1);
-    const Vector2d read = lengths + Vector2d(error(rng), error(rng));
+    const Vector2d wrong(error(rng), error(rng)), read = lengths + wrong;
     const auto report = wizard::solve_captures(
         {.captures = folder / test_case.name,
          .out = folder / "rig",
          .board_measured =
              stddev_mm > 0 ? fmt::format("{:.3f}x{:.3f}mm:{}", read.x(), read.y(), stddev_mm) : ""});
     if (!report) return report.error();
-    print_rows(stddev_mm > 0 ? fmt::format("Limn, lengths to {} mm", stddev_mm) : "Limn, no lengths", truth,
-               report->solution.rig, report->assessment.worst_predicted_mm());
+    print_rows(stddev_mm > 0 ? fmt::format("Limn, lengths to {} mm (drawn: {:+.1f} {:+.1f} of it)", stddev_mm,
+                                           wrong.x() / stddev_mm, wrong.y() / stddev_mm)
+                             : "Limn, no lengths",
+               truth, report->solution.rig, report->assessment.worst_predicted_mm());
     for (const calib::Fault& fault : report->assessment.faults)
       fmt::print("    {}: {}\n", calib::to_text(fault.name), fault.evidence);
   }
