@@ -220,9 +220,10 @@ void add_bench(CLI::App& app, Run& run) {
       "Example: limn bench tracker --frames 4 --detail");
   auto options = std::make_shared<BenchOptions>();
   command
-      ->add_option("name", options->name,
-                   "Benchmark to run: tracker, id, calib, solve, projector, live, remote or tablet; "
-                   "arguments after it are passed on to it")
+      ->add_option(
+          "name", options->name,
+          "Benchmark to run: tracker, id, calib, solve, projector, live, prediction, remote or tablet; "
+          "arguments after it are passed on to it")
       ->required();
   command->prefix_command();
   command->callback([command, options, &run] {
