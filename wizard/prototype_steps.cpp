@@ -111,6 +111,7 @@ class Steps {
       return {};
     }
     world_from_prototype_ = aligned->registration.world_from_prototype;
+    seen_.size = aligned->size;
     seen_.align_rms_mm = 1e3 * aligned->registration.rms_m;
     seen_.warnings.insert(seen_.warnings.end(), aligned->warnings.begin(), aligned->warnings.end());
     for (std::size_t i = 0; i < std::min(k_most_printed, aligned->warnings.size()); ++i)

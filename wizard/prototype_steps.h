@@ -8,6 +8,7 @@
 
 #include "calib/capture_set.h"
 #include "calib/judge/error_map.h"
+#include "calib/surface/scan_size.h"
 #include "core/result.h"
 #include "wizard/capture/backend.h"
 #include "wizard/steps.h"
@@ -27,6 +28,7 @@ struct PrototypeSeen {
   std::size_t points = 0;              ///< number of points of the scan
   double scan_stddev_mm = 0;           ///< median of the points' standard deviations
   std::optional<double> align_rms_mm;  ///< RMS distance of scan and CAD; none: not aligned
+  calib::ScanSize size = {};           ///< the scan's, beside the CAD; a deviation of 0: not compared
   double painted_p95_mm = 0;           ///< 95th percentile of light's predicted error on the prototype
   double painted_good = 0;             ///< share of the lit pixels with at most calib::k_good_mm
   std::vector<std::string> warnings;

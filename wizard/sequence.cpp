@@ -325,6 +325,10 @@ Result<Calibrated> calibrate_rig(const WizardOptions& options,
       done.prototype = std::move(*seen);
     else
       done.no_prototype = seen.message();  // the rig is complete without it
+    if (done.prototype && calib::note_cad_size(done.prototype->size, &done.report)) {
+      LIMN_TRY_STATUS(calib::write_report(done.report, options.out));
+      listener.say(done.report.explanation.verdict);
+    }
   }
   done.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return done;

@@ -33,6 +33,33 @@ std::string provenance(const Report& report, const SolveOptions& options) {
 
 }  // namespace
 
+bool note_cad_size(const ScanSize& size, Report* report) {
+  const Board& board = report->observed.observations.board;
+  const bool is_told = size.stddev > 0 && size.stddev <= expected_growth(board, {}).stddev;
+  if (!is_told || board.is_exact || report->scale_rests_on != "board") return false;
+  const bool is_wrong = contradicts(size);
+  if (is_wrong)
+    add_faults(
+        {{FaultName::wrong_scale,
+          fmt::format("the scan is {:.4f} times as large as the CAD (standard deviation {:.4f}). The rig "
+                      "keeps the board's size, because the model may have been built in another size",
+                      size.ratio, size.stddev),
+          "measure a length on the model, and the board (--board-measured)", Severity::doubt}},
+        &report->assessment);
+  else
+    report->scale_rests_on = "cad";
+  report->explanation = explain(report->observed, report->solution, report->assessment, !is_wrong);
+  return true;
+}
+
+Status write_report(const Report& report, const std::filesystem::path& folder) {
+  const std::string json = report_json(report), html = report_html(report);
+  return write_together(folder, [&](const std::filesystem::path& into) -> Status {
+    LIMN_TRY_STATUS(write_file(into / "report.html", html));
+    return write_file(into / "report.json", json);
+  });
+}
+
 Status write_rig_folder(const Report& report,
                         const SolveOptions& options,
                         const std::filesystem::path& folder) {

@@ -12,6 +12,7 @@
 #include "calib/report/advice.h"
 #include "calib/report/history.h"
 #include "calib/solve.h"
+#include "calib/surface/scan_size.h"
 #include "core/result.h"
 
 namespace limn::calib {
@@ -27,7 +28,7 @@ struct Report {
   std::string made_at = {};                             ///< as PastCalibration::made_at
   History history = {};                                 ///< history of the folder that the report is for
   std::vector<ScaleBarCheck> scale_bar_lengths = {};
-  /// What the scale rests on: board, board_measured or known_length.
+  /// What the scale rests on: board, board_measured, markers, known_length or cad.
   std::string scale_rests_on = "board";
 };
 
@@ -39,6 +40,15 @@ std::string report_json(const Report& report);
 /// residuals; the tables behind it; earlier calibrations of the rig. Only the date differs from run to run;
 /// the stages' times are in report.json.
 std::string report_html(const Report& report);
+
+/// Notes how large the scan of a prototype is beside its CAD, where that tells the size of the rig better
+/// than nothing: the scale rests on the CAD then, and the verdict says so, or `wrong_scale` is a fault.
+/// Whether the report has changed. Sizes that are less certain than a print's, and a board whose size was
+/// checked before, change nothing.
+bool note_cad_size(const ScanSize& size, Report* report);
+
+/// Writes report.json and report.html of a rig folder again, both or none.
+Status write_report(const Report& report, const std::filesystem::path& folder);
 
 /// Writes the rig folder: rig.json, one .cameramodel for each device, observations.json, report.json,
 /// report.html. Each file replaces its predecessor only when it is complete. The provenance in rig.json

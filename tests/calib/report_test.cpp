@@ -60,6 +60,33 @@ TEST(Report, ThePageIsSelfContainedAndSaysTheVerdictInWords) {
   EXPECT_EQ(html.find("inf"), std::string::npos);
 }
 
+TEST(Report, TheScaleRestsOnTheCadWhereAScanHasItsSize) {
+  const Report before = reported(noisy_world(), test_folder(), "2026-11-21T10:00:00Z");
+  Report report = before;
+  ASSERT_NE(before.observed.observations.board.text(), "");
+  report.explanation = explain(report.observed, report.solution, report.assessment, false);
+  EXPECT_NE(report.explanation.verdict.find("nothing has checked"), std::string::npos);
+  EXPECT_FALSE(note_cad_size({0.99, 0}, &report));      // not compared
+  EXPECT_FALSE(note_cad_size({1.001, 0.02}, &report));  // a flat plate
+  EXPECT_EQ(report.scale_rests_on, "board");
+
+  EXPECT_TRUE(note_cad_size({1.001, 0.0005}, &report));
+  EXPECT_EQ(report.scale_rests_on, "cad");
+  EXPECT_EQ(report.explanation.verdict.find("nothing has checked"), std::string::npos);
+  EXPECT_FALSE(note_cad_size({0.96, 0.0005}, &report));  // it was checked
+
+  Report wrong = before;
+  EXPECT_TRUE(note_cad_size({0.96, 0.0005}, &wrong));
+  EXPECT_EQ(wrong.scale_rests_on, "board");
+  EXPECT_EQ(wrong.assessment.faults.back().name, FaultName::wrong_scale);
+  EXPECT_GE(wrong.assessment.verdict, Verdict::usable);
+  EXPECT_NE(wrong.explanation.verdict.find("nothing has checked"), std::string::npos);
+  const fs::path folder = test_folder();
+  ASSERT_TRUE(write_report(wrong, folder).ok());
+  EXPECT_EQ(test::read_json(folder / "report.json")["scale_rests_on"], "board");
+  EXPECT_TRUE(fs::exists(folder / "report.html"));
+}
+
 TEST(Report, DiffersByDateAndSecondsAlone) {
   const World world = noisy_world();
   const auto stripped = [](std::string html) {

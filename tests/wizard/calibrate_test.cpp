@@ -114,6 +114,7 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
   const json second = calibrated_json(with_scan);
   ASSERT_FALSE(second.is_null());
   expect_prototype(second, out, folder / "world.json");
+  EXPECT_EQ(read_json(out / "report.json")["scale_rests_on"], "cad");
   EXPECT_EQ(second["verdict"], "good");
   ASSERT_EQ(second["poses"].size(), poses.size());
   for (std::size_t i = 0; i < poses.size(); ++i)
