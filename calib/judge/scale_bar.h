@@ -1,12 +1,11 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/capture_set.h"
+#include "calib/detected_mark.h"
 #include "calib/judge/faults.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -26,15 +25,6 @@ struct ScaleBar {
 /// "apriltag_36h11:3 apriltag_36h11:7 250mm", or "apriltag_36h11:3 40mm" for the side of one marker (mm, cm
 /// or m).
 Result<ScaleBar> parse_scale_bar(const std::string& text);
-
-/// A square mark in a camera's image of one pose.
-struct DetectedMark {
-  int camera = 0;
-  int pose = 0;
-  std::string name;
-  std::array<Eigen::Vector2d, 4> corners_px;  ///< in order around the mark
-  double stddev_px = 0.05;                    ///< standard deviation of one coordinate of a corner
-};
 
 /// The measurement by one camera and one projector in one pose.
 struct ScaleBarView {

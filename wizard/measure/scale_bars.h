@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "calib/judge/scale_bar.h"
@@ -7,11 +8,20 @@
 
 namespace limn::wizard {
 
-/// The scale bars' markers as the tracker finds them, for every pose and camera: each marker in the white
-/// image of the first projector that shows it. Error: an unknown family.
+/// The scale bars' markers, as marks_of() finds them.
 Result<std::vector<calib::DetectedMark>> scale_bar_marks(const calib::CaptureSet& captures,
                                                          const Rig& rig,
                                                          const std::vector<calib::ScaleBar>& lengths);
+
+/// All markers of these families as the tracker finds them, for every pose and camera: each marker in the
+/// white image of the first projector that shows it. The board's own markers are left out. `rig`: its lenses
+/// are used where it is given. Error: an unknown family.
+Result<std::vector<calib::DetectedMark>> marks_of(const calib::CaptureSet& captures,
+                                                  const std::vector<std::string>& families,
+                                                  const Rig* rig = nullptr);
+
+/// The families of the scale bars' markers.
+std::vector<std::string> families_of(const std::vector<calib::ScaleBar>& lengths);
 
 /// The scale bars of capture.json and of the command line.
 Result<std::vector<calib::ScaleBar>> scale_bar_lengths(const calib::CaptureSet& captures,
