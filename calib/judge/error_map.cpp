@@ -69,7 +69,7 @@ Vector2d pinhole_place(const Imager& camera, const Vector3d& p_camera) {
 
 // Extends the map over the boards' middles, where they lie beyond camera 0's image.
 void extend(const Observations& observations, const Solution& solution, ErrorMap* map) {
-  constexpr double k_beyond = 0.02;  // of the image: what the lens's distortion moves
+  constexpr double k_beyond = 0.02;  // share of the image: what the lens's distortion moves
   constexpr double k_most = 4;       // images in each direction; farther, boards stand at camera 0's side
   const Imager& camera = solution.rig.cameras.front();
   const Board& board = observations.board;

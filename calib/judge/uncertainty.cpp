@@ -68,7 +68,7 @@ struct Placed {
   MatrixXd by_values;         // 6 x value count
   Matrix6d by_camera;         // derivative by the camera's pose
   Matrix6d noise_covariance;  // covariance for a noise of 1 px^2
-  int points = 0;             // of the target, that the camera sees
+  int points = 0;             // the target's points that the camera sees
 };
 
 std::optional<Placed> placed(const Imager& camera, const RigidTarget& thing) {
@@ -186,7 +186,7 @@ std::vector<SurfaceTarget> panel_places(const Solution& solution,
 std::vector<std::vector<SurfaceTarget>> panel_targets(const Solution& solution,
                                                       const Board& board,
                                                       size_t projector) {
-  constexpr double k_least_share = 0.2;  // of the panel's places
+  constexpr double k_least_share = 0.2;  // share of the panel's places
   const auto& cameras = solution.rig.cameras;
   std::vector<std::vector<SurfaceTarget>> targets;
   for (size_t camera = 0; camera < cameras.size(); ++camera) {

@@ -78,7 +78,7 @@ Json error_json(const Report& report) {
           {"region", "the space where the boards were, as far as the projector and a camera reach"}};
 }
 
-// Cells row by row; null where nothing is known.
+// Each known cell as column, row and mm.
 Json error_maps_json(const Report& report) {
   const Imager& camera = report.solution.rig.cameras.front();
   const auto pair = [](const Eigen::Vector2d& v) { return Json::array({rounded(v.x()), rounded(v.y())}); };
@@ -87,10 +87,14 @@ Json error_maps_json(const Report& report) {
     Json planes = Json::array();
     for (const ErrorMap::Plane& plane : map.planes) {
       Json cells = Json::array();
-      for (const double mm : plane.p95_mm) cells.push_back(rounded(mm));
+      for (size_t i = 0; i < plane.p95_mm.size(); ++i) {
+        const int cell = static_cast<int>(i);
+        if (std::isfinite(plane.p95_mm[i]))
+          cells.push_back({cell % map.columns, cell / map.columns, rounded(plane.p95_mm[i])});
+      }
       planes.push_back({{"depth_m", rounded(plane.depth_m)},
                         {"size_m", pair(map.size_m(camera, plane))},
-                        {"p95_mm", std::move(cells)}});
+                        {"cells", std::move(cells)}});
     }
     list.push_back(
         {{"projector", report.observed.observations.projectors[static_cast<size_t>(map.projector)].name},

@@ -38,7 +38,7 @@ constexpr double k_car_m = 2.6;  // from the cameras to the car
 constexpr double k_length_m = 4.2, k_height_m = 1.4;
 constexpr double k_pixel_m = 0.0024;  // of the projectors, on the car
 constexpr auto k_scene_pose = "pose20";
-constexpr size_t k_cost_poses = 10;
+constexpr size_t k_cost_poses = k_poses;
 
 // ---- the true rig; world: x along the car, y down, z away from the devices; origin between the cameras ----
 
@@ -362,7 +362,8 @@ Status enlarge_series(const std::vector<fs::path>& images,
                       const fs::path& to,
                       int white,
                       const cv::Mat& noise) {
-  constexpr double k_dark = 40;  // grey levels
+  constexpr double k_dark = 40;                                       // grey levels
+  if (fs::exists(to / fs::relative(images.back(), from))) return {};  // by an earlier run
   const cv::Mat lit = enlarged(images[static_cast<size_t>(white)], noise);
   double most = 0;
   cv::minMaxLoc(lit, nullptr, &most);
@@ -379,10 +380,8 @@ Status enlarge_series(const std::vector<fs::path>& images,
 
 // The captures with images twice as large, with a sensor's noise added again.
 Status enlarge(const fs::path& from, const fs::path& to) {
-  if (fs::exists(to / "complete")) return {};
-  fs::remove_all(to);
   fs::create_directories(to);
-  fs::copy_file(from / "patterns.json", to / "patterns.json");
+  fs::copy_file(from / "patterns.json", to / "patterns.json", fs::copy_options::overwrite_existing);
   LIMN_TRY(const std::string text, read_file(from / "capture.json"));
   auto json = nlohmann::ordered_json::parse(text);
   for (auto& camera : json["cameras"])
@@ -397,7 +396,7 @@ Status enlarge(const fs::path& from, const fs::path& to) {
         LIMN_TRY_STATUS(enlarge_series(images, from, to, set.patterns[projector].white(), noise));
     }
   }
-  return write_file(to / "complete", "");
+  return {};
 }
 
 Status print_cost(const fs::path& captures, const std::vector<std::string>& skip) {
