@@ -389,6 +389,13 @@ void add_solve(CLI::App& app, Run& run) {
           "'apriltag_36h11:3 40mm'; or a second board, such as 'charuco:6x5:30mm:aruco_5x5_50'; repeat the "
           "option for more")
       ->allow_extra_args(false);
+  command
+      ->add_option(
+          "--family", options->families,
+          "Families of the markers on the prototype, separated by commas: with several cameras their "
+          "corners join the cameras (tie points). No size is needed")
+      ->delimiter(',')
+      ->capture_default_str();
   add_board_measured(command, &options->board_measured);
   command->add_flag(
       "--pixels-not-square", options->pixels_not_square,

@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <opencv2/calib3d.hpp>
+#include <set>
 
 #include "calib/measurement_model.h"
 
@@ -19,6 +20,7 @@ using Eigen::Vector3d;
 constexpr int k_least_corners = 8;  // in a view that is used to calibrate a camera
 // Two do not determine a lens, and one is left out for the held-out error.
 constexpr size_t k_least_poses = 3;
+constexpr size_t k_least_shared = 12;  // points that an imager's pose is estimated from
 
 Pose to_pose(const cv::Mat& rvec, const cv::Mat& tvec) {
   const Vector3d w(rvec.at<double>(0), rvec.at<double>(1), rvec.at<double>(2));
@@ -120,36 +122,23 @@ Pose medoid(const std::vector<Pose>& candidates) {
   return candidates[best];
 }
 
-// Computes camera_from_world for every camera and the boards' poses in the world, starting from camera 0.
-Status link(const Observations& observations, const std::vector<CameraSeed>& seeds, Seed* into) {
-  std::vector<bool> linked(seeds.size(), false);
-  auto place = [&](size_t camera, const Pose& camera_from_world) {
-    linked[camera] = true;
-    into->cameras[camera].imager_from_world = camera_from_world;
-    for (const auto& [pose, camera_from_board] : seeds[camera].camera_from_board) {
-      auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
-      if (!world_from_board) world_from_board = camera_from_world.inverse() * camera_from_board;
-    }
-  };
-  place(0, Pose());
-  for (size_t round = 1; round < seeds.size(); ++round) {
-    for (size_t camera = 1; camera < seeds.size(); ++camera) {
-      if (linked[camera]) continue;
-      std::vector<Pose> candidates;
-      for (const auto& [pose, camera_from_board] : seeds[camera].camera_from_board) {
-        const auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
-        if (world_from_board) candidates.push_back(camera_from_board * world_from_board->inverse());
-      }
-      if (!candidates.empty()) place(camera, medoid(candidates));
-    }
+// Places a camera, and the boards that it sees and no other has placed.
+void place(size_t camera, const CameraSeed& seeded, const Pose& camera_from_world, Seed* into) {
+  into->cameras[camera].imager_from_world = camera_from_world;
+  for (const auto& [pose, camera_from_board] : seeded.camera_from_board) {
+    auto& world_from_board = into->world_from_board[static_cast<size_t>(pose)];
+    if (!world_from_board) world_from_board = camera_from_world.inverse() * camera_from_board;
   }
-  for (size_t camera = 0; camera < seeds.size(); ++camera) {
-    if (!linked[camera])
-      return error(
-          "{}: sees no board pose together with another camera. Capture some poses that it shares with {}.",
-          observations.cameras[camera].name, observations.cameras[0].name);
+}
+
+// A camera's pose, by each board that cameras already placed see, too.
+std::vector<Pose> poses_by_boards(const CameraSeed& seeded, const Seed& placed) {
+  std::vector<Pose> candidates;
+  for (const auto& [pose, camera_from_board] : seeded.camera_from_board) {
+    const auto& world_from_board = placed.world_from_board[static_cast<size_t>(pose)];
+    if (world_from_board) candidates.push_back(camera_from_board * world_from_board->inverse());
   }
-  return {};
+  return candidates;
 }
 
 // Places the boards of poses with too few corners to calibrate with.
@@ -164,17 +153,23 @@ void place_remaining(const Observations& observations, Seed* into) {
   }
 }
 
+// Points of the world and their pixels in one imager.
 struct Points {
   std::vector<Vector3d> p_world;
   std::vector<Vector2d> px;
   std::vector<int> poses;
+  size_t pose_count() const { return std::set<int>(poses.begin(), poses.end()).size(); }
 };
 
-Points points_of(const Observations& observations, const Seed& seeded, int projector) {
+// What the placed boards show of a projector: through all cameras, or through those that `uses` names.
+Points points_of(const Observations& observations,
+                 const Seed& seeded,
+                 int projector,
+                 const std::vector<bool>& uses) {
   const BoardShape shape{observations.board.width_m(), observations.board.height_m()};
   Points points;
   for (const Match& match : observations.matches) {
-    if (match.projector != projector) continue;
+    if (match.projector != projector || !uses[static_cast<size_t>(match.camera)]) continue;
     const auto& world_from_board = seeded.world_from_board[static_cast<size_t>(match.pose)];
     if (!world_from_board) continue;
     const Imager& camera = seeded.cameras[static_cast<size_t>(match.camera)];
@@ -190,32 +185,190 @@ Points points_of(const Observations& observations, const Seed& seeded, int proje
 }
 
 Result<Imager> seed_projector(const Observations& observations,
-                              const Seed& seeded,
                               int projector,
+                              const Points& points,
                               const LensModel& model) {
   const CapturedDevice& device = observations.projectors[static_cast<size_t>(projector)];
-  const Points points = points_of(observations, seeded, projector);
-  std::vector<int> poses = points.poses;
-  poses.erase(std::unique(poses.begin(), poses.end()), poses.end());
-  if (poses.size() < 2 || points.px.size() < 20)
+  const size_t poses = points.pose_count();
+  if (poses < 2 || points.px.size() < 20)
     return error(
         "{}: expected its light on the board in at least 3 poses, found {} poses with {} patches. Point it "
         "at the board, darken the room, check the exposure.",
-        device.name, poses.size(), points.px.size());
+        device.name, poses, points.px.size());
   const auto linear = linear_camera(points.p_world, points.px);
   if (!linear)
     return error(
         "{}: the {} board poses do not determine it. Vary tilt (20 to 45 degrees) and distance more.",
-        device.name, poses.size());
-  Imager imager;
+        device.name, poses);
+  Imager imager{device.name, device.width, device.height, {}, linear->imager_from_world};
   imager.lens.model = model;
   imager.lens.values.assign(static_cast<size_t>(model.value_count()), 0.0);
   const double f = std::sqrt(linear->fx * linear->fy);
   imager.lens.values[0] = imager.lens.values[1] = f;
   imager.lens.values[2] = linear->cx;
   imager.lens.values[3] = linear->cy;
-  imager.imager_from_world = linear->imager_from_world;
   return imager;
+}
+
+// The pose of an imager whose lens is known: imager_from_world. nullopt where most points disagree with it.
+std::optional<Pose> pose_by_points(const Lens& lens, const Points& points) {
+  constexpr float k_far = 0.02F;  // on the plane z = 1: initial lenses are right to this
+  constexpr int k_tries = 200;
+  std::vector<cv::Point3d> p_world;
+  std::vector<cv::Point2d> flat;
+  for (size_t i = 0; i < points.px.size(); ++i) {
+    const auto d = lens.unproject(points.px[i]);
+    if (!d || !(d->z() > 0)) continue;
+    p_world.emplace_back(points.p_world[i].x(), points.p_world[i].y(), points.p_world[i].z());
+    flat.emplace_back(d->x() / d->z(), d->y() / d->z());
+  }
+  if (p_world.size() < k_least_shared) return std::nullopt;
+  cv::Mat rvec, tvec;
+  std::vector<int> inliers;
+  const bool found = cv::solvePnPRansac(p_world, flat, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rvec, tvec,
+                                        false, k_tries, k_far, 0.999, inliers, cv::SOLVEPNP_SQPNP);
+  if (!found || 2 * inliers.size() < p_world.size()) return std::nullopt;
+  const Pose pose = to_pose(rvec, tvec);
+  return pose.is_finite() ? std::optional(pose) : std::nullopt;
+}
+
+// Finds where cameras stand that see no board together with a placed one.
+class Joiner {
+ public:
+  Joiner(const Observations& observations,
+         const std::vector<CameraSeed>& seeds,
+         const std::vector<LensModel>& projector_models,
+         const Seed& placed,
+         const std::vector<bool>& is_placed)
+      : observations_(observations), seeds_(seeds), placed_(placed), is_placed_(is_placed) {
+    for (int p = 0; p < std::ssize(observations.projectors); ++p) {
+      models_.push_back(projector_models[static_cast<size_t>(p)]);
+      lit_.push_back(points_of(observations, placed, p, is_placed));
+      const auto projector = seed_projector(observations, p, lit_.back(), models_.back());
+      projectors_.push_back(projector ? std::optional(*projector) : std::nullopt);
+    }
+  }
+
+  std::optional<Pose> camera_pose(size_t camera) const {
+    std::vector<Pose> candidates;
+    for (size_t p = 0; p < projectors_.size(); ++p) {
+      if (const auto pose = by_projector(camera, p)) candidates.push_back(*pose);
+    }
+    if (candidates.empty()) return pose_by_points(placed_.cameras[camera].lens, tie_points(camera));
+    return medoid(candidates);
+  }
+
+ private:
+  // Both sides see light of one projector on boards of their own. The side that sees more of it gives its
+  // lens.
+  std::optional<Pose> by_projector(size_t camera, size_t p) const {
+    std::vector<bool> alone(is_placed_.size(), false);
+    alone[camera] = true;
+    Seed own = placed_;
+    own.world_from_board.assign(observations_.poses.size(), std::nullopt);
+    place(camera, seeds_[camera], Pose(), &own);  // the camera's own frame takes the place of the world
+    const Points seen = points_of(observations_, own, static_cast<int>(p), alone);
+    const auto projector = seed_projector(observations_, static_cast<int>(p), seen, models_[p]);
+    const bool is_better_known = projectors_[p] && lit_[p].pose_count() >= seen.pose_count();
+    if (is_better_known || (projectors_[p] && !projector)) {
+      const auto projector_from_camera = pose_by_points(projectors_[p]->lens, seen);
+      if (!projector_from_camera) return std::nullopt;
+      return projector_from_camera->inverse() * projectors_[p]->imager_from_world;
+    }
+    if (!projector) return std::nullopt;
+    const auto projector_from_world = pose_by_points(projector->lens, lit_[p]);
+    if (!projector_from_world) return std::nullopt;
+    return projector->imager_from_world.inverse() * *projector_from_world;
+  }
+
+  // Tie points that a placed camera and a placed projector locate, and `camera` observes.
+  Points tie_points(size_t camera) const {
+    struct Sight {
+      std::optional<Vector2d> px, px_placed, px_projector;
+      size_t placed = 0, projector = 0;
+    };
+    std::vector<Sight> sights(observations_.points.size());
+    const auto add = [&](Sight* sight, size_t by, const Vector2d& px) {
+      if (by == camera) sight->px = px;
+      if (!is_placed_[by]) return;
+      sight->px_placed = px;
+      sight->placed = by;
+    };
+    for (size_t i = 0; i < sights.size(); ++i)
+      add(&sights[i], static_cast<size_t>(observations_.points[i].camera), observations_.points[i].px_camera);
+    for (const TiePointObservation& seen : observations_.tie_observations) {
+      Sight& sight = sights[static_cast<size_t>(seen.point)];
+      const auto by = static_cast<size_t>(seen.imager);
+      if (!seen.by_projector) {
+        add(&sight, by, seen.px);
+      } else if (projectors_[by]) {
+        sight.px_projector = seen.px;
+        sight.projector = by;
+      }
+    }
+    Points points;
+    for (size_t i = 0; i < sights.size(); ++i) {
+      const Sight& sight = sights[i];
+      if (!sight.px || !sight.px_placed || !sight.px_projector) continue;
+      const Imager &eye = placed_.cameras[sight.placed], &light = *projectors_[sight.projector];
+      LensRay ray;
+      if (!find_ray(eye.lens.model, eye.lens.values, *sight.px_placed, false, &ray)) continue;
+      const double depth = triangulated_depth({eye.lens.model, eye.lens.values, eye.imager_from_world}, ray,
+                                              {light.lens.model, light.lens.values, light.imager_from_world},
+                                              *sight.px_projector);
+      if (!(depth > 0)) continue;
+      points.p_world.push_back(eye.imager_from_world.inverse() * (depth * ray.d));
+      points.px.push_back(*sight.px);
+      points.poses.push_back(observations_.points[i].pose);
+    }
+    return points;
+  }
+
+  const Observations& observations_;
+  const std::vector<CameraSeed>& seeds_;
+  const Seed& placed_;
+  const std::vector<bool>& is_placed_;
+  std::vector<LensModel> models_;
+  std::vector<Points> lit_;  // for each projector, by the placed cameras
+  std::vector<std::optional<Imager>> projectors_;
+};
+
+// Computes camera_from_world for every camera and the boards' poses in the world, starting from camera 0:
+// first through boards that two cameras see, then through the light of a projector that both see, or through
+// tie points.
+Status link(const Observations& observations,
+            const std::vector<CameraSeed>& seeds,
+            const std::vector<LensModel>& projector_models,
+            Seed* into) {
+  std::vector<bool> is_placed(seeds.size(), false);
+  const auto place_one = [&](const auto& pose_of) {
+    for (size_t camera = 0; camera < seeds.size(); ++camera) {
+      const std::optional<Pose> pose = is_placed[camera] ? std::nullopt : pose_of(camera);
+      if (!pose) continue;
+      is_placed[camera] = true;
+      place(camera, seeds[camera], *pose, into);
+      return true;
+    }
+    return false;
+  };
+  place_one([](size_t) { return std::optional(Pose()); });
+  for (bool goes_on = true; goes_on;) {
+    goes_on = place_one([&](size_t camera) -> std::optional<Pose> {
+      const std::vector<Pose> candidates = poses_by_boards(seeds[camera], *into);
+      return candidates.empty() ? std::nullopt : std::optional(medoid(candidates));
+    });
+    if (goes_on || std::count(is_placed.begin(), is_placed.end(), false) == 0) continue;
+    const Joiner joiner(observations, seeds, projector_models, *into, is_placed);
+    goes_on = place_one([&](size_t camera) { return joiner.camera_pose(camera); });
+  }
+  const auto apart = std::find(is_placed.begin(), is_placed.end(), false);
+  if (apart == is_placed.end()) return {};
+  const auto& name = observations.cameras[static_cast<size_t>(apart - is_placed.begin())].name;
+  return error(
+      "{}: nothing joins it with {}: no board that both see, no projector whose light both see on boards, no "
+      "scene that both see. Capture some board poses in the light of a projector that both see, or the "
+      "prototype without a board.",
+      name, observations.cameras[0].name);
 }
 
 // Moves the points' centre to 0 and scales their mean distance to sqrt(dimension).
@@ -322,15 +475,12 @@ Result<Seed> seed(const Observations& observations,
     seeded.cameras.push_back({device.name, device.width, device.height, camera.lens, Pose()});
     cameras.push_back(std::move(camera));
   }
-  LIMN_TRY_STATUS(link(observations, cameras, &seeded));
+  LIMN_TRY_STATUS(link(observations, cameras, projector_models, &seeded));
   place_remaining(observations, &seeded);
   for (int i = 0; i < static_cast<int>(observations.projectors.size()); ++i) {
+    const Points points = points_of(observations, seeded, i, std::vector(cameras.size(), true));
     LIMN_TRY(Imager projector,
-             seed_projector(observations, seeded, i, projector_models[static_cast<size_t>(i)]));
-    const CapturedDevice& device = observations.projectors[static_cast<size_t>(i)];
-    projector.name = device.name;
-    projector.width = device.width;
-    projector.height = device.height;
+             seed_projector(observations, i, points, projector_models[static_cast<size_t>(i)]));
     seeded.projectors.push_back(std::move(projector));
   }
   return seeded;

@@ -18,9 +18,10 @@ struct Seed {
 };
 
 /// Initialises cameras by OpenCV's calibration with a plain lens, linked through boards that two of them see,
-/// and projectors by the direct linear transform from points on the boards to their pixels, which holds for
-/// any lens shift. The models (one for each device) define how many values each lens has; values that are not
-/// initialised are 0.
+/// else through a projector whose light both see on boards of their own, else through tie points that both
+/// see; and projectors by the direct linear transform from points on the boards to their pixels, which holds
+/// for any lens shift. The models (one for each device) define how many values each lens has; values that are
+/// not initialised are 0.
 Result<Seed> seed(const Observations& observations,
                   const std::vector<LensModel>& camera_models,
                   const std::vector<LensModel>& projector_models);

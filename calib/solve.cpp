@@ -328,9 +328,14 @@ std::vector<std::string> lens_models(const Observations& observations, const Sol
   return names;
 }
 
-int Solution::projector_at(size_t projector) const {
+int Solution::camera_at(size_t camera) const {
   int at = 0;
-  for (const Imager& camera : rig.cameras) at += camera.lens.model.value_count() + 6;
+  for (size_t i = 0; i < camera; ++i) at += rig.cameras[i].lens.model.value_count() + 6;
+  return at;
+}
+
+int Solution::projector_at(size_t projector) const {
+  int at = camera_at(rig.cameras.size());
   for (size_t i = 0; i < projector; ++i) at += rig.projectors[i].lens.model.value_count() + 6;
   return at;
 }

@@ -77,7 +77,8 @@ struct Solution {
   /// board poses, shape and print marginalised. Order: camera 0's values and pose (boxplus's perturbation),
   /// camera 1's …, then the projectors'. Camera 0's pose defines the world: its entries are zero.
   Eigen::MatrixXd covariance;
-  /// First index of a projector's values in `covariance`.
+  /// First index of a camera's or projector's values in `covariance`.
+  int camera_at(size_t camera) const;
   int projector_at(size_t projector) const;
 };
 

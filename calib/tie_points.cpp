@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -13,6 +14,7 @@ using Eigen::Vector2d;
 
 constexpr double k_least_share = 0.6;  // share of a window's pixels with a label
 constexpr double k_stddev_floor_px = 0.02;
+constexpr double k_still_px = 0.5;  // a mark's corners stay within this where nothing moved
 constexpr int k_bin_px = 4;  // bin size in a projector's image, for finding which cameras see its pixel
 
 // The projector pixel at the centre of a window of a camera's image, and its derivative.
@@ -161,7 +163,91 @@ int add_point(const Choice& choice, int camera, int pose, Observations* into) {
   return point;
 }
 
+// A mark as one camera sees it: the mean over poses.
+struct SeenMark {
+  std::array<Vector2d, 4> corners_px;
+  double stddev_px = 0;
+  int poses = 0;
+};
+
+// A mark at one place.
+struct StandingMark {
+  int pose = 0;  // the first that shows it
+  std::map<int, SeenMark> cameras;
+};
+
+double farthest_corner(const std::array<Vector2d, 4>& a, const std::array<Vector2d, 4>& b) {
+  double far = 0;
+  for (size_t i = 0; i < a.size(); ++i) far = std::max(far, (a[i] - b[i]).norm());
+  return far;
+}
+
+bool disagrees(const StandingMark& standing, const DetectedMark& mark) {
+  const auto seen = standing.cameras.find(mark.camera);
+  return seen != standing.cameras.end() &&
+         farthest_corner(seen->second.corners_px, mark.corners_px) > k_still_px;
+}
+
+void add_sight(const DetectedMark& mark, StandingMark* standing) {
+  if (standing->cameras.empty()) standing->pose = mark.pose;
+  SeenMark& seen = standing->cameras[mark.camera];
+  ++seen.poses;
+  seen.stddev_px = std::max(seen.stddev_px, std::max(mark.stddev_px, k_stddev_floor_px));
+  for (size_t i = 0; i < mark.corners_px.size(); ++i) {
+    if (seen.poses == 1) seen.corners_px[i].setZero();
+    seen.corners_px[i] += (mark.corners_px[i] - seen.corners_px[i]) / seen.poses;
+  }
+}
+
+// The places of one mark: one where it stands still, else one in each pose.
+std::vector<StandingMark> places_of(const std::vector<const DetectedMark*>& marks) {
+  StandingMark still;
+  std::map<int, StandingMark> by_pose;
+  bool stands = true;
+  for (const DetectedMark* mark : marks) {
+    stands = stands && !disagrees(still, *mark);
+    add_sight(*mark, &still);
+    add_sight(*mark, &by_pose[mark->pose]);
+  }
+  if (stands) return {still};
+  std::vector<StandingMark> places;
+  for (auto& [pose, standing] : by_pose) places.push_back(std::move(standing));
+  return places;
+}
+
+// The corners of a mark at one place, as pixels of the camera that sees it best.
+void add_corners(const StandingMark& standing, Observations* into) {
+  const auto first =
+      std::min_element(standing.cameras.begin(), standing.cameras.end(),
+                       [](const auto& a, const auto& b) { return a.second.stddev_px < b.second.stddev_px; });
+  for (size_t corner = 0; corner < first->second.corners_px.size(); ++corner) {
+    const int point = static_cast<int>(into->points.size());
+    into->points.push_back({standing.pose, first->first, first->second.corners_px[corner]});
+    for (const auto& [camera, seen] : standing.cameras) {
+      if (camera == first->first) continue;
+      into->tie_observations.push_back({point, false, camera, seen.corners_px[corner],
+                                        std::hypot(seen.stddev_px, first->second.stddev_px)});
+    }
+  }
+}
+
 }  // namespace
+
+std::vector<std::string> add_marker_points(const std::vector<DetectedMark>& marks, Observations* into) {
+  std::map<std::string, std::vector<const DetectedMark*>> by_name;
+  for (const DetectedMark& mark : marks) by_name[mark.name].push_back(&mark);
+  std::vector<std::string> names;
+  for (const auto& [name, sights] : by_name) {
+    bool is_used = false;
+    for (const StandingMark& standing : places_of(sights)) {
+      if (standing.cameras.size() < 2) continue;
+      add_corners(standing, into);
+      is_used = true;
+    }
+    if (is_used) names.push_back(name);
+  }
+  return names;
+}
 
 void add_tie_points(const std::vector<std::vector<Decoded>>& decoded,
                     int pose,

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "calib/code/decode.h"
+#include "calib/detected_mark.h"
 #include "calib/observations.h"
 
 namespace limn::calib {
@@ -36,5 +38,11 @@ void add_room_points(const std::vector<Decoded>& decoded,
                      int pose,
                      const TiePointOptions& options,
                      Observations* into);
+
+/// Makes the corners of marks that several cameras see into tie points. A mark whose corners stay at the same
+/// pixels wherever a camera sees it again stands still: its corners are the same four points in all poses,
+/// also for cameras that see it in different poses. A mark that moves between poses gives points of its own
+/// in each pose. Marks need not be of known size. Returns the names of the marks that gave points.
+std::vector<std::string> add_marker_points(const std::vector<DetectedMark>& marks, Observations* into);
 
 }  // namespace limn::calib

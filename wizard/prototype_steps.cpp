@@ -143,14 +143,13 @@ class Steps {
   // The largest predicted error of all projectors at a point; NaN where it is not known.
   double worst_mm(const Eigen::Vector3d& p_world) const {
     const Imager& camera = rig_.cameras.front();
-    const auto px = camera.project(p_world);
+    const Eigen::Vector3d p_camera = camera.imager_from_world * p_world;
     double worst = std::nan("");
-    if (!px) return worst;
-    const Eigen::Vector2d place((px->x() + 0.5) / camera.width, (px->y() + 0.5) / camera.height);
-    if ((place.array() < 0).any() || (place.array() > 1).any()) return worst;
-    const double depth_m = (camera.imager_from_world * p_world).z();
-    for (const calib::ErrorMap& map : steps_.maps)
-      if (const double mm = map.at(place, depth_m); std::isfinite(mm)) worst = std::fmax(worst, mm);
+    for (const calib::ErrorMap& map : steps_.maps) {
+      const auto place = map.place_of(camera, p_camera);
+      if (!place) continue;
+      if (const double mm = map.at(*place, p_camera.z()); std::isfinite(mm)) worst = std::fmax(worst, mm);
+    }
     return worst;
   }
 

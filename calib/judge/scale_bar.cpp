@@ -211,9 +211,6 @@ double noise_of(const Centre& a, const Centre& b) {
 // deviation.
 double calibration_of(const Solution& solution, int camera, int projector, const Pair& pair) {
   if (solution.covariance.size() == 0) return 0;
-  int camera_at = 0;
-  for (int i = 0; i < camera; ++i)
-    camera_at += solution.rig.cameras[static_cast<size_t>(i)].lens.model.value_count() + 6;
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(solution.covariance.cols());
   const auto vary = [&](int at, bool is_camera) {
     const Imager& original = is_camera ? solution.rig.cameras[static_cast<size_t>(camera)]
@@ -238,7 +235,7 @@ double calibration_of(const Solution& solution, int camera, int projector, const
       gradient[at + i] = difference / (2 * step);
     }
   };
-  vary(camera_at, true);
+  vary(solution.camera_at(static_cast<size_t>(camera)), true);
   vary(solution.projector_at(static_cast<size_t>(projector)), false);
   return std::sqrt(std::max(0.0, gradient.dot(solution.covariance * gradient)));
 }

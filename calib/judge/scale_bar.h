@@ -1,7 +1,5 @@
 #pragma once
 
-#include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,6 +7,7 @@
 #include "calib/board/board.h"
 #include "calib/board_print.h"
 #include "calib/capture_set.h"
+#include "calib/detected_mark.h"
 #include "calib/judge/faults.h"
 #include "calib/solve.h"
 #include "core/result.h"
@@ -32,15 +31,6 @@ struct ScaleBar {
 /// measured size behind it as parse_board_measured() reads it. A board that nobody measured is as uncertain
 /// as a print, or exact.
 Result<ScaleBar> parse_scale_bar(const std::string& text);
-
-/// A square mark in a camera's image of one pose.
-struct DetectedMark {
-  int camera = 0;
-  int pose = 0;
-  std::string name;
-  std::array<Eigen::Vector2d, 4> corners_px;  ///< in order around the mark
-  double stddev_px = 0.05;                    ///< standard deviation of one coordinate of a corner
-};
 
 /// The measurement by one camera and one projector in one pose.
 struct ScaleBarView {

@@ -63,10 +63,12 @@ std::optional<ProjectedPoint> project_with_derivatives(const Imager& imager, con
 // Derivatives of a target's pose, as a camera measures it (rotation about `centre`, then translation), by the
 // camera's values and pose and by the measured pixels' noise.
 struct Placed {
+  size_t camera = 0;  // the one that measures
   Vector3d centre;
   MatrixXd by_values;         // 6 x value count
   Matrix6d by_camera;         // derivative by the camera's pose
   Matrix6d noise_covariance;  // covariance for a noise of 1 px^2
+  int points = 0;             // the target's points that the camera sees
 };
 
 std::optional<Placed> placed(const Imager& camera, const RigidTarget& thing) {
@@ -87,6 +89,7 @@ std::optional<Placed> placed(const Imager& camera, const RigidTarget& thing) {
     ++points;
   }
   if (points < k_least_points) return std::nullopt;
+  placed.points = points;
   const Vector6d scale = normal.diagonal().cwiseSqrt().cwiseInverse();
   const Matrix6d scaled = scale.asDiagonal() * normal * scale.asDiagonal();
   if (!scaled.allFinite() || scaled.determinant() < 1e-12) return std::nullopt;
@@ -94,6 +97,18 @@ std::optional<Placed> placed(const Imager& camera, const RigidTarget& thing) {
   placed.by_values = -placed.noise_covariance * by_values;
   placed.by_camera = -placed.noise_covariance * by_camera;
   return placed;
+}
+
+// By the camera that sees most of the target; of several, by the first.
+std::optional<Placed> placed_by_best(const Rig& rig, const RigidTarget& thing) {
+  std::optional<Placed> best;
+  for (size_t camera = 0; camera < rig.cameras.size(); ++camera) {
+    auto tried = placed(rig.cameras[camera], thing);
+    if (!tried || (best && tried->points <= best->points)) continue;
+    tried->camera = camera;
+    best = std::move(tried);
+  }
+  return best;
 }
 
 std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
@@ -104,19 +119,20 @@ std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
   const Imager& light = solution.rig.projectors[projector];
   const auto seen = project_with_derivatives(light, place.p_world);
   const Vector3d p_light = light.imager_from_world.inverse().translation;
-  const Vector3d p_eye = solution.rig.cameras.front().imager_from_world.inverse().translation;
+  const Vector3d p_eye = solution.rig.cameras[thing.camera].imager_from_world.inverse().translation;
   if (!seen) return std::nullopt;
   const double towards_light = place.n_world.dot((p_light - place.p_world).normalized());
   if (std::abs(towards_light) < k_least_cosine ||
       towards_light * place.n_world.dot(p_eye - place.p_world) < 0)
-    return std::nullopt;  // grazing light, or light on the side that camera 0 does not see
+    return std::nullopt;  // grazing light, or light on the side that the camera does not see
   Eigen::Matrix<double, 2, 6> by_thing;
   by_thing << -seen->by_point * cross(place.p_world - thing.centre), seen->by_point;
   MatrixXd by_unknowns = MatrixXd::Zero(2, uncertainty.covariance.cols());
   const Eigen::Index camera_values = thing.by_values.cols(), values = seen->by_values.cols();
   const int at = solution.projector_at(projector);
-  by_unknowns.leftCols(camera_values) = by_thing * thing.by_values;  // camera 0's parameters come first
-  by_unknowns.middleCols(camera_values, 6) = by_thing * thing.by_camera;
+  const int camera_at = solution.camera_at(thing.camera);
+  by_unknowns.middleCols(camera_at, camera_values) = by_thing * thing.by_values;
+  by_unknowns.middleCols(camera_at + camera_values, 6) = by_thing * thing.by_camera;
   by_unknowns.middleCols(at, values) = seen->by_values;
   by_unknowns.middleCols(at + values, 6) = seen->by_imager;
   // Derivative of projector pixels by metres on the surface.
@@ -131,12 +147,15 @@ std::optional<Eigen::Matrix2d> light_covariance(const Solution& solution,
   return m_by_px * px_covariance * m_by_px.transpose();
 }
 
-// A target that fills the middle of the projector's panel at the boards' distance, as far as camera 0 sees
+// A target that fills the middle of the projector's panel at the boards' distance, as far as the camera sees
 // it: points of a sheet with some relief, facing the middle between the two devices. It does not depend on
 // where the boards stood, so that a rig whose boards stayed in the middle is judged at the panel's edges,
 // too.
-std::vector<SurfaceTarget> panel_places(const Solution& solution, const Board& board, size_t projector) {
-  const Imager &camera = solution.rig.cameras.front(), &light = solution.rig.projectors[projector];
+std::vector<SurfaceTarget> panel_places(const Solution& solution,
+                                        const Board& board,
+                                        size_t projector,
+                                        size_t by_camera) {
+  const Imager &camera = solution.rig.cameras[by_camera], &light = solution.rig.projectors[projector];
   Vector3d p_boards = Vector3d::Zero();
   int boards = 0;
   for (const auto& world_from_board : solution.world_from_board) {
@@ -162,7 +181,29 @@ std::vector<SurfaceTarget> panel_places(const Solution& solution, const Board& b
   return places;
 }
 
-// Selects points that camera 0 sees, as far apart as possible: each is the farthest from those before.
+// The targets on the panel, for each camera: those places that no camera before it sees. A camera that adds
+// little to those before it gets none.
+std::vector<std::vector<SurfaceTarget>> panel_targets(const Solution& solution,
+                                                      const Board& board,
+                                                      size_t projector) {
+  constexpr double k_least_share = 0.2;  // share of the panel's places
+  const auto& cameras = solution.rig.cameras;
+  std::vector<std::vector<SurfaceTarget>> targets;
+  for (size_t camera = 0; camera < cameras.size(); ++camera) {
+    std::vector<SurfaceTarget> places = panel_places(solution, board, projector, camera);
+    std::erase_if(places, [&](const SurfaceTarget& place) {
+      return std::any_of(
+          cameras.begin(), cameras.begin() + static_cast<std::ptrdiff_t>(camera),
+          [&](const Imager& before) { return project_with_derivatives(before, place.p_world); });
+    });
+    if (camera > 0 && static_cast<double>(places.size()) < k_least_share * k_panel_grid * k_panel_grid)
+      places.clear();
+    targets.push_back(std::move(places));
+  }
+  return targets;
+}
+
+// Selects points that the camera sees, as far apart as possible: each is the farthest from those before.
 RigidTarget measured_points(const Imager& camera, const std::vector<SurfaceTarget>& places) {
   std::vector<std::pair<Vector3d, double>> left;  // each with its distance to the nearest chosen point
   for (const SurfaceTarget& place : places) {
@@ -247,7 +288,7 @@ std::vector<std::optional<Eigen::Matrix2d>> light_covariances(const Solution& so
                                                               size_t projector,
                                                               std::span<const SurfaceTarget> places) {
   std::vector<std::optional<Eigen::Matrix2d>> covariances(places.size());
-  const auto measured = placed(solution.rig.cameras.front(), thing);
+  const auto measured = placed_by_best(solution.rig, thing);
   if (!measured) return covariances;
   for (size_t i = 0; i < places.size(); ++i)
     covariances[i] = light_covariance(solution, uncertainty, *measured, projector, places[i]);
@@ -293,15 +334,18 @@ std::vector<double> propagated_error_mm(const Observations& observations,
                                         const Uncertainty& uncertainty) {
   std::vector<double> p95;
   for (size_t projector = 0; projector < solution.rig.projectors.size(); ++projector) {
-    const std::vector<SurfaceTarget> home = panel_places(solution, observations.board, projector);
-    const auto all = placements(home);
+    const auto targets = panel_targets(solution, observations.board, projector);
     std::array<std::vector<Eigen::Matrix2d>, 3> groups;
-    for (size_t group = 0; group < groups.size(); ++group) {
-      for (const Pose& world_from_before : all[group]) {
-        const std::vector<SurfaceTarget> places = placed_anew(world_from_before, home);
-        const RigidTarget thing = measured_points(solution.rig.cameras.front(), places);
-        for (const auto& covariance : light_covariances(solution, uncertainty, thing, projector, places)) {
-          if (covariance) groups[group].push_back(*covariance);
+    for (size_t camera = 0; camera < targets.size(); ++camera) {
+      if (targets[camera].empty()) continue;
+      const auto all = placements(targets[camera]);
+      for (size_t group = 0; group < groups.size(); ++group) {
+        for (const Pose& world_from_before : all[group]) {
+          const std::vector<SurfaceTarget> places = placed_anew(world_from_before, targets[camera]);
+          const RigidTarget thing = measured_points(solution.rig.cameras[camera], places);
+          for (const auto& covariance : light_covariances(solution, uncertainty, thing, projector, places)) {
+            if (covariance) groups[group].push_back(*covariance);
+          }
         }
       }
     }

@@ -10,7 +10,8 @@
 
 namespace limn::calib {
 
-/// A rigid target in the world, as points. Camera 0 measures its pose from the pixels of these points.
+/// A rigid target in the world, as points. One camera measures its pose from the pixels of these points: the
+/// one that sees most of them; of several, the first.
 using RigidTarget = std::vector<Eigen::Vector3d>;
 
 /// Uncertainty of the rig. `covariance`: covariance of the devices' parameters, in the order of
@@ -48,8 +49,9 @@ double p95_of(std::span<const std::vector<Eigen::Matrix2d>> groups);
 
 /// For each projector: 95 % error on the surface, mm, of points on a rigid target that fills its panel at the
 /// boards' distance and whose pose camera 0 measures from 24 of its points: a third of the light with the
-/// target in place, a third with it moved by 150 mm, a third with it turned by 40 degrees both ways. Infinite
-/// when a projector does not reach the target.
+/// target in place, a third with it moved by 150 mm, a third with it turned by 40 degrees both ways. Where
+/// other cameras see much of the panel that camera 0 does not, they measure targets there, which count as
+/// much. Infinite when no camera sees what a projector reaches.
 std::vector<double> propagated_error_mm(const Observations& observations,
                                         const Solution& solution,
                                         const Uncertainty& uncertainty);

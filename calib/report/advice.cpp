@@ -217,16 +217,22 @@ void advise_trust(const Observations& observations,
   }
 }
 
-// For example "1.90 mm at worst, 1.60 m from camera0, upper left of its image".
-std::optional<std::string> worst_place(const Observations& observations, const ErrorMap& map) {
+// For example "1.90 mm at worst, 1.60 m from camera0, upper left of its image", or, on a map that is wider
+// than the image, "…, 2.10 m right of its axis and 0.30 m above".
+std::optional<std::string> worst_place(const Imager& camera, const ErrorMap& map) {
   const double worst = map.worst_mm();
   for (const ErrorMap::Plane& plane : map.planes) {
     for (size_t i = 0; i < plane.p95_mm.size() && worst > 0; ++i) {
       if (plane.p95_mm[i] != worst) continue;
-      const int column = static_cast<int>(i) % map.columns, row = static_cast<int>(i) / map.columns;
-      return fmt::format("{:.2f} mm at worst, {:.2f} m from {}, {} of its image", worst, plane.depth_m,
-                         observations.cameras[0].name,
-                         place_in_image((column + 0.5) / map.columns, (row + 0.5) / map.rows));
+      const Vector2d place = map.place_of_cell(static_cast<int>(i));
+      const std::string text =
+          fmt::format("{:.2f} mm at worst, {:.2f} m from {}, ", worst, plane.depth_m, camera.name);
+      const auto p = map.point_at(camera, place, plane.depth_m);
+      if (!map.is_wider_than_image() || !p)
+        return text + place_in_image(place.x(), place.y()) + " of its image";
+      return text + fmt::format("{:.2f} m {} of its axis and {:.2f} m {}", std::abs(p->x()),
+                                p->x() < 0 ? "left" : "right", std::abs(p->y()),
+                                p->y() < 0 ? "above" : "below");
     }
   }
   return std::nullopt;
@@ -291,6 +297,7 @@ std::string camera_words(const Observations& observations,
 }
 
 std::string verdict_words(const Observations& observations,
+                          const Rig& rig,
                           const Assessment& assessment,
                           bool is_scale_checked) {
   const std::string condition =
@@ -312,7 +319,7 @@ std::string verdict_words(const Observations& observations,
   const auto map = std::find_if(maps.begin(), maps.end(), [&](const ErrorMap& m) {
     return static_cast<size_t>(m.projector) == projector;
   });
-  if (const auto place = map == maps.end() ? std::nullopt : worst_place(observations, *map))
+  if (const auto place = map == maps.end() ? std::nullopt : worst_place(rig.cameras.front(), *map))
     text += " (" + *place + ")";
   text += condition;
   const auto& poses = assessment.held_out.poses;
@@ -341,7 +348,7 @@ Explanation explain(const Observed& observed,
                     bool is_scale_checked) {
   const Observations& observations = observed.observations;
   Explanation words;
-  words.verdict = verdict_words(observations, assessment, is_scale_checked);
+  words.verdict = verdict_words(observations, solution.rig, assessment, is_scale_checked);
   if (!is_scale_checked) words.advice.push_back(length_to_measure(observations.board));
   for (const Fault& fault : assessment.advice) words.advice.push_back(to_text(fault));
   advise_edges(observations, &words.advice);

@@ -30,6 +30,8 @@ struct Report {
   std::vector<ScaleBarCheck> scale_bar_lengths = {};
   /// What the scale rests on: board, board_measured, markers, known_length or cad.
   std::string scale_rests_on = "board";
+  /// Markers (`family:id`) whose corners were tie points, because several cameras saw them.
+  std::vector<std::string> tie_markers = {};
 };
 
 /// report.json, as docs/formats.md describes it.

@@ -75,7 +75,37 @@ Json error_json(const Report& report) {
            "the larger of the held-out error and of the uncertainty propagated to a target in place, moved "
            "by 150 "
            "mm and turned by 40 degrees"},
-          {"region", "the space where the boards were, as far as the projector and camera 0 reach"}};
+          {"region", "the space where the boards were, as far as the projector and a camera reach"}};
+}
+
+// Each known cell as column, row and mm.
+Json error_maps_json(const Report& report) {
+  const Imager& camera = report.solution.rig.cameras.front();
+  const auto pair = [](const Eigen::Vector2d& v) { return Json::array({rounded(v.x()), rounded(v.y())}); };
+  Json list = Json::array();
+  for (const ErrorMap& map : report.assessment.error_maps) {
+    Json planes = Json::array();
+    for (const ErrorMap::Plane& plane : map.planes) {
+      Json cells = Json::array();
+      for (size_t i = 0; i < plane.p95_mm.size(); ++i) {
+        const int cell = static_cast<int>(i);
+        if (std::isfinite(plane.p95_mm[i]))
+          cells.push_back({cell % map.columns, cell / map.columns, rounded(plane.p95_mm[i])});
+      }
+      planes.push_back({{"depth_m", rounded(plane.depth_m)},
+                        {"size_m", pair(map.size_m(camera, plane))},
+                        {"cells", std::move(cells)}});
+    }
+    list.push_back(
+        {{"projector", report.observed.observations.projectors[static_cast<size_t>(map.projector)].name},
+         {"columns", map.columns},
+         {"rows", map.rows},
+         {"low", pair(map.low)},
+         {"high", pair(map.high)},
+         {"worst_mm", rounded(map.worst_mm())},
+         {"planes", std::move(planes)}});
+  }
+  return list;
 }
 
 // All models that were tried; only the given ones where nothing was selected.
@@ -166,6 +196,7 @@ std::string report_json(const Report& report) {
                      {"held_out", held_out_json(a.held_out)},
                      {"lens_models", lenses_json(report)},
                      {"predicted_error_mm", error_json(report)},
+                     {"error_maps", error_maps_json(report)},
                      {"decode",
                       {{"share", rounded(a.decoded_share)},
                        {"share_of_contrasted", rounded(a.decoded_of_contrasted)},
@@ -173,6 +204,7 @@ std::string report_json(const Report& report) {
                      {"epipolar", epipolar_json(report)},
                      {"pulls", normalised_residuals_json(a.normalised_residuals)},
                      {"scale_rests_on", report.scale_rests_on},
+                     {"tie_markers", report.tie_markers},
                      {"known_lengths", lengths_json(report)},
                      {"faults", faults},
                      {"moved", moved_json(since_last)},

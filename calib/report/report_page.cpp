@@ -93,7 +93,7 @@ std::string advice_list(const std::vector<std::string>& advice) {
 // The predicted error of each projector on planes in front of camera 0.
 std::string error_maps_html(const Report& report) {
   const Observations& observations = report.observed.observations;
-  const CapturedDevice& camera = observations.cameras.front();
+  const Imager& camera = report.solution.rig.cameras.front();
   double most = 0;
   for (const ErrorMap& map : report.assessment.error_maps) most = std::max(most, map.worst_mm());
   // Outside the volume of the boards the error may grow without limit; the colours cover the rest.
@@ -101,45 +101,67 @@ std::string error_maps_html(const Report& report) {
   if (const double predicted = report.assessment.worst_predicted_mm(); std::isfinite(predicted))
     most = std::min(most, k_brightest * predicted);
   std::string html;
+  bool is_wide = false;
   for (const ErrorMap& map : report.assessment.error_maps) {
+    is_wide = is_wide || map.is_wider_than_image();
     const std::string& name = observations.projectors[static_cast<size_t>(map.projector)].name;
-    html += "<div class='small'>\n";
+    const Vector2d extent = map.high - map.low;
+    html += map.is_wider_than_image() ? "<div class='grid'>\n" : "<div class='small'>\n";
     for (const ErrorMap::Plane& plane : map.planes) {
       double worst = 0;
       for (const double mm : plane.p95_mm) worst = std::isfinite(mm) ? std::max(worst, mm) : worst;
-      html += html_figure(heat_map(camera.width, camera.height, map.columns, plane.p95_mm, most),
-                          fmt::format("{}, {:.2f} m", name, plane.depth_m),
-                          worst > 0 ? fmt::format("at most {:.2f} mm", worst) : "out of reach");
+      const Vector2d size_m = map.size_m(camera, plane);
+      html += html_figure(
+          heat_map(static_cast<int>(std::lround(extent.x() * camera.width)),
+                   static_cast<int>(std::lround(extent.y() * camera.height)), map.columns, plane.p95_mm,
+                   most),
+          fmt::format("{}, {:.2f} m", name, plane.depth_m),
+          worst > 0 ? fmt::format("{:.1f} x {:.1f} m, at most {:.2f} mm", size_m.x(), size_m.y(), worst)
+                    : "out of reach");
     }
     html += "</div>\n";
   }
   if (html.empty() || !(most > 0)) return "";
   return fmt::format(
-      "<p>95 % error of light on a target whose pose {} measures, on planes across its view. Red: this value "
-      "or more. Grey: the projector does not reach.</p>{}\n{}",
-      escaped(camera.name), colour_key(most, "mm"), html);
+      "<p>95 % error of light on a target whose pose {} measures, on planes across {}. Red: this value "
+      "or more. Grey: {}.</p>{}\n{}",
+      escaped(is_wide ? "the camera that sees most of it" : camera.name),
+      escaped(is_wide ? camera.name + "'s view and beyond it, as far as boards stood" : "its view"),
+      is_wide ? "no camera sees it, or the projector does not reach it" : "the projector does not reach",
+      colour_key(most, "mm"), html);
 }
 
-// Held-out errors on the boards in camera 0's image.
+// A camera's matches of a projector, with their held-out errors.
+std::vector<Dot> board_errors(const Report& report, size_t projector, size_t camera) {
+  const Observations& observations = report.observed.observations;
+  std::vector<Dot> dots;
+  for (size_t k = 0; k < observations.matches.size(); ++k) {
+    const Match& match = observations.matches[k];
+    const double error = report.assessment.held_out.errors_m[k] * 1e3;
+    if (static_cast<size_t>(match.projector) == projector && static_cast<size_t>(match.camera) == camera &&
+        std::isfinite(error))
+      dots.push_back({match.px_camera, error});
+  }
+  return dots;
+}
+
+// Held-out errors on the boards in the cameras' images.
 std::string board_errors_html(const Report& report) {
   const Observations& observations = report.observed.observations;
-  const CapturedDevice& camera = observations.cameras.front();
   const auto& errors = report.assessment.held_out_error_mm;
   double most = 0;
   for (const double mm : errors) most = std::isfinite(mm) ? std::max(most, mm) : most;
   if (!(most > 0)) return "";
   std::string html = "<div class='grid'>\n";
   for (size_t i = 0; i < observations.projectors.size(); ++i) {
-    std::vector<Dot> dots;
-    for (size_t k = 0; k < observations.matches.size(); ++k) {
-      const Match& match = observations.matches[k];
-      const double error = report.assessment.held_out.errors_m[k] * 1e3;
-      if (static_cast<size_t>(match.projector) == i && match.camera == 0 && std::isfinite(error))
-        dots.push_back({match.px_camera, error});
+    for (size_t c = 0; c < observations.cameras.size(); ++c) {
+      const CapturedDevice& camera = observations.cameras[c];
+      const std::vector<Dot> dots = board_errors(report, i, c);
+      if (c > 0 && dots.empty()) continue;
+      html += html_figure(
+          dot_map(camera.width, camera.height, dots, most), observations.projectors[i].name,
+          fmt::format("on all boards, in {}'s image: 95 % within {:.2f} mm", camera.name, errors[i]));
     }
-    html += html_figure(
-        dot_map(camera.width, camera.height, dots, most), observations.projectors[i].name,
-        fmt::format("on all boards, in {}'s image: 95 % within {:.2f} mm", camera.name, errors[i]));
   }
   return "<p>Each board pose is predicted by a solve that has not used it. The colour shows how far "
          "the light would land from its target on the board.</p>" +

@@ -4,7 +4,7 @@
 // by 40 degrees. Boards of the cases "paper" are printed 0.15 % too wide with smooth errors of 0.1 mm, bowed
 // and twisted; they are solved as limn solve does it, with lengths measured to 0.03 and to 0.1 mm and without
 // lengths. Captures are kept for the next run. Usage: limn bench calib [NAME…]     (names of the rigs
-// below; all when none is given)
+// below; all when none is given; car: a rig as large as a car; car-cost: its memory and time at full size)
 #include <fmt/core.h>
 
 #include <chrono>
@@ -23,6 +23,7 @@
 #include "calib/solve.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
+#include "tests/bench/car_bench.h"
 #include "tests/calib/bad_print.h"
 #include "tests/calib/true_rig.h"
 #include "wizard/capture/capture_plan.h"
@@ -502,6 +503,16 @@ int main(int argc, char** argv) {
   const std::set<std::string> wanted(argv + 1, argv + argc);
   const std::filesystem::path folder = "out/bench-calib";
   int done = 0;
+  using Bench = limn::Status (*)(const std::filesystem::path&);
+  const std::map<std::string, Bench> large = {{"car", limn::test::bench_car},
+                                              {"car-cost", limn::test::bench_car_cost}};
+  for (const auto& [name, bench] : large) {
+    if (!wanted.contains(name)) continue;
+    const limn::Status status = bench(folder);
+    if (!status.ok()) fmt::print(stderr, "{}: {}\n", name, status.message());
+    if (!status.ok()) return 1;
+    ++done;
+  }
   for (const auto& test_case : limn::test::all_cases()) {
     if (!wanted.empty() && !wanted.contains(test_case.name)) continue;
     const limn::Status status = limn::test::run_case(test_case, folder);

@@ -129,5 +129,57 @@ TEST(RoomPoints, SurroundTheBoardAndLeaveItOut) {
   }
 }
 
+// A mark of 60 mm, 1.1 m in front of the cameras, moved aside.
+std::optional<DetectedMark> mark_of(const World& world, int camera, int pose, double aside_m) {
+  const Imager& eye = world.rig.cameras[static_cast<size_t>(camera)];
+  DetectedMark mark{camera, pose, "apriltag_36h11:3", {}, 0.03};
+  for (size_t i = 0; i < 4; ++i) {
+    const double x = i == 1 || i == 2 ? 0.03 : -0.03, y = i > 1 ? 0.03 : -0.03;
+    const auto px = eye.project(Vector3d(x + aside_m, y, 1.1 + 0.3 * x));
+    if (!px) return std::nullopt;
+    mark.corners_px[i] = *px;
+  }
+  return mark;
+}
+
+TEST(MarkerPoints, AMarkThatStandsStillTiesCamerasThatSeeItInDifferentPoses) {
+  const World world = make_world(2, 1, 0, 0.5);
+  Observations o = world.observations;
+  o.points.push_back({});  // some may exist already
+  const std::vector<DetectedMark> marks = {*mark_of(world, 0, 0, 0), *mark_of(world, 0, 2, 0),
+                                           *mark_of(world, 1, 5, 0)};
+  EXPECT_EQ(add_marker_points(marks, &o), std::vector<std::string>{"apriltag_36h11:3"});
+  ASSERT_EQ(o.points.size(), 5U);
+  ASSERT_EQ(o.tie_observations.size(), 4U);
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(o.points[i + 1].pose, 0);
+    EXPECT_EQ(o.points[i + 1].camera, 0);
+    EXPECT_TRUE(near(o.points[i + 1].px_camera, marks[0].corners_px[i], 1e-9));
+    EXPECT_EQ(o.tie_observations[i].point, static_cast<int>(i) + 1);
+    EXPECT_FALSE(o.tie_observations[i].by_projector);
+    EXPECT_EQ(o.tie_observations[i].imager, 1);
+    EXPECT_TRUE(near(o.tie_observations[i].px, marks[2].corners_px[i], 1e-9));
+    EXPECT_NEAR(o.tie_observations[i].stddev_px, 0.03 * std::sqrt(2.0), 1e-9);
+  }
+}
+
+TEST(MarkerPoints, AMarkThatMovedTiesOnlyWithinAPose) {
+  const World world = make_world(2, 1, 0, 0.5);
+  Observations o = world.observations;
+  const std::vector<DetectedMark> marks = {*mark_of(world, 0, 0, 0), *mark_of(world, 1, 0, 0),
+                                           *mark_of(world, 0, 1, 0.05), *mark_of(world, 1, 2, 0.1)};
+  EXPECT_EQ(add_marker_points(marks, &o).size(), 1U);
+  ASSERT_EQ(o.points.size(), 4U);
+  for (const TiePoint& point : o.points) EXPECT_EQ(point.pose, 0);
+  for (const TiePointObservation& seen : o.tie_observations) EXPECT_EQ(seen.imager, 1);
+}
+
+TEST(MarkerPoints, OneCameraAloneIsNotTied) {
+  const World world = make_world(2, 1, 0, 0.5);
+  Observations o = world.observations;
+  EXPECT_TRUE(add_marker_points({*mark_of(world, 0, 0, 0), *mark_of(world, 0, 1, 0)}, &o).empty());
+  EXPECT_TRUE(o.points.empty());
+}
+
 }  // namespace
 }  // namespace limn::calib

@@ -137,7 +137,10 @@ WizardView an_end() {
   view.to_do = {"projector1: add poses near its left edge."};
   view.faults.clear();
   for (int projector = 0; projector < 2; ++projector) {
-    calib::ErrorMap map{projector, 16, 13, {}};
+    calib::ErrorMap map;
+    map.projector = projector;
+    map.columns = 16;
+    map.rows = 13;
     calib::ErrorMap::Plane plane{1.2, {}};
     for (int i = 0; i < 16 * 13; ++i)
       plane.p95_mm.push_back(i % 16 < 2 ? NAN : 0.02 * (i % 16) * (1 + projector));

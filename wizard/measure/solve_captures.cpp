@@ -16,6 +16,7 @@
 #include "calib/response/measure_response.h"
 #include "calib/response/vignetting.h"
 #include "calib/solve.h"
+#include "calib/tie_points.h"
 #include "core/file.h"
 #include "core/lens.h"
 #include "core/log.h"
@@ -68,6 +69,21 @@ Status solve_uneven_print(const calib::Observations& observations,
   LIMN_TRY(*choice, calib::solve_selecting_models(observations, *solving));
   *solving = choice->options;
   return {};
+}
+
+// Adds the corners of markers that several cameras see as tie points. Returns the markers' names.
+Result<std::vector<std::string>> add_markers(const calib::CaptureSet& captures,
+                                             std::vector<std::string> families,
+                                             const std::vector<calib::ScaleBar>& lengths,
+                                             calib::Observations* observations) {
+  if (captures.cameras.size() < 2) return std::vector<std::string>();
+  for (std::string& family : families_of(lengths)) families.push_back(std::move(family));
+  std::sort(families.begin(), families.end());
+  families.erase(std::unique(families.begin(), families.end()), families.end());
+  LIMN_TRY(const auto marks, marks_of(captures, families));
+  const std::vector<std::string> names = calib::add_marker_points(marks, observations);
+  if (!names.empty()) log_info("markers that several cameras see: {}", fmt::join(names, ", "));
+  return names;
 }
 
 // Measures the known lengths with the solved rig as if the print's size were known exactly, and solves again
@@ -195,6 +211,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   const double response_seconds = seconds_since(begun);
   LIMN_TRY(calib::Observed observed, calib::observe(captures));
   LIMN_TRY_STATUS(calib::check_board(captures, observed.observations));
+  LIMN_TRY(const auto tie_markers, add_markers(captures, options.families, lengths, &observed.observations));
   const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
   calib::SolveOptions solving;
   solving.camera_model = options.camera_model;
@@ -232,6 +249,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   report.scale_rests_on = scale_rests_on(report.scale_bar_lengths, measured.has_value());
   const bool is_scale_checked = captures.board.is_exact || report.scale_rests_on != "board";
   report.explanation = calib::explain(report.observed, report.solution, report.assessment, is_scale_checked);
+  report.tie_markers = tie_markers;
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
   LIMN_TRY_STATUS(write_together(options.out, [&](const std::filesystem::path& into) -> Status {

@@ -23,6 +23,9 @@ struct SolveCommandOptions {
   /// Scale bars that the cameras see, each as "apriltag_36h11:3 apriltag_36h11:7 250mm", in addition to those
   /// of capture.json.
   std::vector<std::string> scale_bar_lengths = {};
+  /// Families of the markers that stand on the prototype, or anywhere but on the board: with several cameras
+  /// their corners are tie points. The scale bars' families count, too.
+  std::vector<std::string> families = {"apriltag_36h11"};
   /// The print's measured size, as calib/board_print.h reads it; empty: that of capture.json, if any.
   std::string board_measured = {};
   /// Cameras' pixels may be not square (images that were stretched), so that no print is found to be uneven.
