@@ -5,6 +5,7 @@
 #include <compare>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <span>
 #include <utility>
 
 #include "core/log.h"
@@ -57,6 +58,57 @@ struct GpuTriangle {
 };
 
 constexpr std::size_t k_triangle_texels = sizeof(GpuTriangle) / sizeof(std::uint32_t);
+
+// Volume of the tetrahedron of the origin and a triangle. Its sum over a closed mesh is the mesh's volume.
+double signed_volume(const scene::Mesh& mesh, std::size_t triangle) {
+  Eigen::Matrix3d corners;
+  for (std::size_t k = 0; k < 3; ++k)
+    corners.col(static_cast<Eigen::Index>(k)) = mesh.positions[mesh.triangles[triangle][k]].cast<double>();
+  return corners.determinant() / 6;
+}
+
+// Whether the triangle across side k of a triangle has the same side, in the opposite direction, and is
+// linked back to it. The mesh is the first one, so that its ids begin with 1.
+bool is_linked_back(const scene::Mesh& mesh,
+                    std::span<const GpuTriangle> linked,
+                    std::size_t triangle,
+                    std::size_t k) {
+  const std::uint32_t id = linked[triangle].beside[k];
+  if (id == 0) return false;
+  const std::size_t other = id - 1;
+  const auto corner = [&](std::size_t t, std::size_t i) { return mesh.positions[mesh.triangles[t][i % 3]]; };
+  for (std::size_t j = 0; j < 3; ++j)
+    if (linked[other].beside[j] == triangle + 1 && corner(other, j + 1) == corner(triangle, k + 2) &&
+        corner(other, j + 2) == corner(triangle, k + 1))
+      return true;
+  return false;
+}
+
+// Whether a mesh bounds a solid: each side belongs to two triangles, which run along it in opposite
+// directions, and each connected piece winds as seen from outside (its volume is positive).
+bool is_solid(const scene::Mesh& mesh, std::span<const GpuTriangle> linked) {
+  std::vector<bool> is_seen(linked.size());
+  std::vector<std::size_t> to_visit;
+  for (std::size_t start = 0; start < linked.size(); ++start) {
+    if (is_seen[start]) continue;
+    double volume = 0;
+    to_visit = {start};
+    is_seen[start] = true;
+    while (!to_visit.empty()) {
+      const std::size_t triangle = to_visit.back();
+      to_visit.pop_back();
+      volume += signed_volume(mesh, triangle);
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (!is_linked_back(mesh, linked, triangle, k)) return false;
+        const std::size_t next = linked[triangle].beside[k] - 1;
+        if (!is_seen[next]) to_visit.push_back(next);
+        is_seen[next] = true;
+      }
+    }
+    if (volume <= 0) return false;
+  }
+  return !linked.empty();
+}
 
 // Appends a mesh's triangles with the ids of their neighbours. Where more than two triangles share a side,
 // each gets one neighbour. Corners at the same position count as one.
@@ -195,11 +247,15 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   // memory.
   staging.triangles.reserve(count);
   if (scene.prototype) append_linked(scene.prototype->mesh, &staging.triangles);
+  const bool is_prototype_solid = scene.prototype && is_solid(scene.prototype->mesh, staging.triangles);
   for (const scene::Slot& slot : scene.slots)
     for (const scene::Variant& variant : slot.variants) append_linked(variant.mesh, &staging.triangles);
   staging.corners.reserve(3 * count);
   staging.normals.reserve(3 * count);
-  if (scene.prototype) prototype_ = add(scene.prototype->mesh, 0, &staging);
+  if (scene.prototype) {
+    prototype_ = add(scene.prototype->mesh, 0, &staging);
+    prototype_->is_solid = is_prototype_solid;
+  }
   for (const scene::Slot& slot : scene.slots) {
     SlotRuns runs{slot.name, slot.mode == scene::Mode::surface, {}};
     const int owner = owner_count();

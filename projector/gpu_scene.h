@@ -25,6 +25,9 @@ struct TriangleRun {
   int first = 0;
   int count = 0;
   bool has_cut_outs = false;  ///< Whether a material uses an alpha cutoff.
+  /// Whether it bounds a solid and its triangles wind as seen from outside, so that its front faces hide its
+  /// back faces. (Unchecked: that it does not turn inside out where it cuts through itself.)
+  bool is_solid = false;
   Eigen::Vector3d p_lower = Eigen::Vector3d::Zero();
   Eigen::Vector3d p_upper = Eigen::Vector3d::Zero();
   std::vector<Cluster> clusters = {};  ///< Together they cover the whole run, in its order.

@@ -32,6 +32,15 @@ PartCoverage counted(const scene::PosedPart& part, const cv::Mat& labels, std::u
   return out;
 }
 
+// Adds the meshes of `from` that `others` does not show in the same way.
+void add_changed(const std::vector<PlacedRun>& from,
+                 const std::vector<PlacedRun>& others,
+                 std::vector<PlacedRun>* changed) {
+  for (const PlacedRun& run : from)
+    if (std::none_of(others.begin(), others.end(), [&](const PlacedRun& o) { return is_same(run, o); }))
+      changed->push_back(run);
+}
+
 }  // namespace
 
 CompositeWeights::CompositeWeights(Composite what) {
@@ -80,6 +89,13 @@ bool ImagerView::Overlay::is_valid_for(const Imager& imager_now,
          is_same(imager.imager_from_world, imager_now.imager_from_world);
 }
 
+bool ImagerView::Overlay::keeps_other_pixels(const Imager& imager_now,
+                                             const scene::PosedScene& posed_now,
+                                             const CompositeWeights& weights_now) const {
+  return posed && weights == weights_now && is_same_prototype(*posed, posed_now) &&
+         posed->light == posed_now.light && is_same(imager.imager_from_world, imager_now.imager_from_world);
+}
+
 // The overlay drawn for this imager before, or a new one.
 ImagerView::Overlay& ImagerView::overlay_of(const Imager& imager, bool is_view, Kind kind) {
   for (Overlay& overlay : overlays_)
@@ -93,33 +109,53 @@ ImagerView::Overlay& ImagerView::overlay_of(const Imager& imager, bool is_view, 
   overlay.is_view = is_view;
   overlay.kind = kind;
   overlay.parts = Canvas(width, height, GL_RGBA32F);
+  glClearTexImage(*overlay.parts.texture, 0, GL_RGBA, GL_FLOAT, nullptr);
   overlay.behind = make_texture(GL_TEXTURE_2D, GL_RGBA8, width, height);
   overlay.out = Canvas(width, height, GL_RGBA8);
   return overlay;
 }
 
-// Draws the parts as the imager sees them, and in a view the prototype, too.
-void ImagerView::draw_parts(const Imager& imager, const scene::PosedScene& posed, Overlay* overlay) {
+// Draws the parts as the imager sees them, and in a view the prototype, too. Where only parts have changed,
+// only their old and new places are drawn again.
+void ImagerView::draw_parts(const Imager& imager,
+                            const scene::PosedScene& posed,
+                            const CompositeWeights& weights,
+                            Overlay* overlay) {
   SceneCache& scene = shared_.scene;
   const bool is_view = overlay->is_view;
   scene.prepare(posed, is_view ? SceneCache::FromProjectors::nothing : SceneCache::FromProjectors::prototype);
-  scene.draw_from_imager(imager, !is_view && !has_contact_shadow_);
   const GpuLens& lens = scene.lens_of(imager);
-  overlay->places =
-      scene.visibility().visible_rects(imager, lens.baked, scene.runs(), scene.scene_from_world(), is_view,
-                                       has_contact_shadow_ ? ContactShadow::k_reach : 0);
+  const double around_m = has_contact_shadow_ ? ContactShadow::k_reach : 0;
+  const auto places_of = [&](const std::vector<PlacedRun>& runs) {
+    return scene.visibility().visible_rects(imager, lens.baked, runs, scene.scene_from_world(), is_view,
+                                            around_m);
+  };
+  const cv::Size size(imager.width, imager.height);
+  if (!overlay->keeps_other_pixels(imager, posed, weights)) {
+    clear_light(overlay->parts.texture, size, overlay->places, 0);
+    overlay->runs.clear();
+  }
+  std::vector<PlacedRun> changed;
+  add_changed(scene.runs(), overlay->runs, &changed);
+  add_changed(overlay->runs, scene.runs(), &changed);
+  const std::vector<cv::Rect> places = without_overlaps(places_of(changed));
+  clear_light(overlay->parts.texture, size, places, 0);
+  if (!is_view) std::erase_if(changed, [](const PlacedRun& run) { return run.owner == 0; });
+  scene.draw_from_imager_over(imager, changed, around_m);
   Resources resources = scene.resources(lens, imager)
                             .with(Resource::albedo, shared_.balance.albedo())
-                            .with(Resource::composite_weights, overlay->weights);
+                            .with(Resource::composite_weights, weights);
   if (has_contact_shadow_) {
     contact_shadow_->place(posed);
     resources = resources.with(Resource::contact_shadow, *contact_shadow_);
   }
-  parts_passes_.draw({.is_view = is_view, .is_shadowed = has_contact_shadow_},
-                     {overlay->parts.texture, {imager.width, imager.height}}, overlay->places, smoothing_,
-                     resources, &shared_.times);
+  parts_passes_.draw({.is_view = is_view, .is_shadowed = has_contact_shadow_}, {overlay->parts.texture, size},
+                     places, smoothing_, resources, &shared_.times);
+  overlay->runs = scene.runs();
+  overlay->places = places_of(scene.runs());
   overlay->posed = posed;
   overlay->imager = imager;
+  overlay->weights = weights;
 }
 
 // Draws the parts over an imager's image (BGR). The parts themselves are drawn again only if something has
@@ -129,10 +165,7 @@ cv::Mat ImagerView::lay_over(const cv::Mat& bgr,
                              const scene::PosedScene& posed,
                              const CompositeWeights& weights,
                              Overlay* overlay) {
-  if (!overlay->is_valid_for(imager, posed, weights)) {
-    overlay->weights = weights;
-    draw_parts(imager, posed, overlay);
-  }
+  if (!overlay->is_valid_for(imager, posed, weights)) draw_parts(imager, posed, weights, overlay);
   cv::Mat out = bgr.clone();
   for (const cv::Rect& place : overlay->places) upload(overlay->behind, out, place);
   const TextureAt light(k_light_unit, overlay->parts.texture), behind(k_camera_image_unit, overlay->behind);

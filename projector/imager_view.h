@@ -62,7 +62,8 @@ class ImagerView {
     Kind kind = Kind::rest;
     CompositeWeights weights;
     std::optional<scene::PosedScene> posed;  // The scene that was drawn; empty: nothing valid.
-    std::vector<cv::Rect> places;            // Rectangles that may contain parts.
+    std::vector<PlacedRun> runs;             // The meshes that were drawn.
+    std::vector<cv::Rect> places;            // Rectangles that may contain parts; all else is 0.
     Canvas parts;
     GlName behind;  // The background image.
     Canvas out;
@@ -70,10 +71,17 @@ class ImagerView {
     bool is_valid_for(const Imager& imager_now,
                       const scene::PosedScene& posed_now,
                       const CompositeWeights& weights_now) const;
+    // Whether pixels without a mesh that changed look as before.
+    bool keeps_other_pixels(const Imager& imager_now,
+                            const scene::PosedScene& posed_now,
+                            const CompositeWeights& weights_now) const;
   };
   explicit ImagerView(const Shared& shared) : shared_(shared) {}
   Overlay& overlay_of(const Imager& imager, bool is_view, Kind kind);
-  void draw_parts(const Imager& imager, const scene::PosedScene& posed, Overlay* overlay);
+  void draw_parts(const Imager& imager,
+                  const scene::PosedScene& posed,
+                  const CompositeWeights& weights,
+                  Overlay* overlay);
   cv::Mat lay_over(const cv::Mat& bgr,
                    const Imager& imager,
                    const scene::PosedScene& posed,

@@ -29,6 +29,12 @@ void add_outside(const cv::Rect& place, std::span<const cv::Rect> others, std::v
 
 }  // namespace
 
+std::vector<cv::Rect> without_overlaps(std::span<const cv::Rect> places) {
+  std::vector<cv::Rect> out;
+  for (const cv::Rect& place : places) add_outside(place, {}, &out);
+  return out;
+}
+
 void PlacesByMode::clear() {
   for (std::vector<cv::Rect>* places : {&view, &surface, &both}) places->clear();
 }
@@ -105,7 +111,7 @@ void LightPasses::draw(const Target& target,
   const Drawing drawing{target, places, smoothing, with_target, times};
   for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i].is_used = !places.each()[i]->empty();
   for_modes(places, [&](ByMode&, const std::vector<cv::Rect>& parted) {
-    clear_light(target.light, target.size, parted);
+    clear_light(target.light, target.size, parted, 1);  // the edge detection reads the pixels around them
   });
   find_hits(drawing);
   list_candidates(drawing);

@@ -23,6 +23,9 @@ struct PlacesByMode {
   void divide(std::span<const cv::Rect> of_view, std::span<const cv::Rect> of_surface);
 };
 
+/// The area of rectangles that may overlap, as rectangles that do not.
+std::vector<cv::Rect> without_overlaps(std::span<const cv::Rect> places);
+
 struct Smoothing;
 
 /// Draws the light that a projector should give (shaders/light.glsl). Each pass processes a list of pixels

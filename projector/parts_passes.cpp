@@ -64,7 +64,6 @@ void PartsPasses::draw(What what,
                                   .with(Resource::light, light)
                                   .with(Resource::work_list, work_list_)
                                   .with(Resource::deferred_list, deferred_list_);
-  clear_light(target.light, target.size, places);
   {
     const PassTimes::Scope scope(times, "where there may be light");
     work_list_.start(room);

@@ -31,8 +31,8 @@ class PartsPasses {
     const GlName& light;  ///< GL_RGBA32F
     cv::Size size;
   };
-  /// Draws within `places` only. `resources` must hold scene, viewpoints, lens, room light, albedo (views) or
-  /// composite weights (parts), and the contact shadow if it is used.
+  /// Draws within `places` only, where the light must be 0 before. `resources` must hold scene, viewpoints,
+  /// lens, room light, albedo (views) or composite weights (parts), and the contact shadow if it is used.
   void draw(What what,
             const Target& target,
             const std::vector<cv::Rect>& places,

@@ -27,12 +27,14 @@ void PixelList::dispatch() const {
   glDispatchComputeIndirect(k_groups);
 }
 
-void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places) {
+void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places, int around) {
   const cv::Rect whole({0, 0}, size);
   for (const cv::Rect& place : places) {
-    const cv::Rect around = whole & cv::Rect(place.x - 1, place.y - 1, place.width + 2, place.height + 2);
-    glClearTexSubImage(*light, 0, around.x, around.y, 0, around.width, around.height, 1, GL_RGBA, GL_FLOAT,
-                       nullptr);
+    const cv::Rect cleared = whole & cv::Rect(place.x - around, place.y - around, place.width + 2 * around,
+                                              place.height + 2 * around);
+    if (cleared.empty()) continue;
+    glClearTexSubImage(*light, 0, cleared.x, cleared.y, 0, cleared.width, cleared.height, 1, GL_RGBA,
+                       GL_FLOAT, nullptr);
   }
 }
 

@@ -23,8 +23,7 @@ class PixelList final : public Bindable {
   int room_ = 0;
 };
 
-/// Clears an image of linear light (GL_RGBA32F) within rectangles and in the pixels around them, which the
-/// edge detection reads.
-void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places);
+/// Clears an image of linear light (GL_RGBA32F) within rectangles and in the `around` pixels around them.
+void clear_light(const GlName& light, cv::Size size, std::span<const cv::Rect> places, int around);
 
 }  // namespace limn::projector

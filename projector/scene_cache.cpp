@@ -3,17 +3,18 @@
 #include <algorithm>
 
 namespace limn::projector {
-namespace {
+bool is_same(const Pose& a, const Pose& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
+}
+
+bool is_same(const PlacedRun& a, const PlacedRun& b) {
+  return a.owner == b.owner && a.run == b.run && is_same(a.scene_from_owner, b.scene_from_owner) &&
+         a.material == b.material;
+}
 
 bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b) {
   if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
   return !a.world_from_prototype || is_same(*a.world_from_prototype, *b.world_from_prototype);
-}
-
-}  // namespace
-
-bool is_same(const Pose& a, const Pose& b) {
-  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
 }
 
 bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
@@ -86,16 +87,33 @@ void SceneCache::draw_from_viewer(const Imager& viewer) {
   viewpoint_imager_ = viewer;
 }
 
-void SceneCache::draw_from_imager(const Imager& imager, bool parts_alone) {
-  const ViewpointKind wanted = parts_alone ? ViewpointKind::parts_of_imager : ViewpointKind::imager;
-  if (viewpoint_kind_ == wanted && is_same_lens(viewpoint_imager_, imager) &&
-      is_same(viewpoint_imager_.imager_from_world, imager.imager_from_world)) {
-    return;
-  }
+bool SceneCache::is_drawn_from(ViewpointKind kind, const Imager& imager) const {
+  return viewpoint_kind_ == kind && is_same_lens(viewpoint_imager_, imager) &&
+         is_same(viewpoint_imager_.imager_from_world, imager.imager_from_world);
+}
+
+void SceneCache::draw_from_imager(const Imager& imager) {
+  if (is_drawn_from(ViewpointKind::imager, imager)) return;
   const PassTimes::Scope scope(times_, "ids from a camera");
-  visibility_.draw_from_imager(scene_, runs_, scene_from_world_, imager, lens_of(imager).baked, parts_alone);
-  viewpoint_kind_ = wanted;
+  visibility_.draw_from_imager(scene_, runs_, scene_from_world_, imager, lens_of(imager).baked);
+  viewpoint_kind_ = ViewpointKind::imager;
   viewpoint_imager_ = imager;
+}
+
+void SceneCache::draw_from_imager_over(const Imager& imager,
+                                       const std::vector<PlacedRun>& over,
+                                       double around_m) {
+  const auto is_equal = [](const PlacedRun& a, const PlacedRun& b) { return is_same(a, b); };
+  if (is_drawn_from(ViewpointKind::places_of_imager, imager) && viewpoint_around_m_ == around_m &&
+      std::ranges::equal(viewpoint_over_, over, is_equal))
+    return;
+  const PassTimes::Scope scope(times_, "ids from a camera");
+  visibility_.draw_from_imager_over(scene_, runs_, scene_from_world_, imager, lens_of(imager).baked, over,
+                                    around_m);
+  viewpoint_kind_ = ViewpointKind::places_of_imager;
+  viewpoint_imager_ = imager;
+  viewpoint_over_ = over;
+  viewpoint_around_m_ = around_m;
 }
 
 void SceneCache::draw_from_reference_camera(const Imager& camera) {

@@ -16,6 +16,8 @@
 namespace limn::projector {
 
 bool is_same(const Pose& a, const Pose& b);
+bool is_same(const PlacedRun& a, const PlacedRun& b);
+bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b);
 bool is_same(const scene::PosedScene& a, const scene::PosedScene& b);
 /// Whether both have the same size and lens; their poses may differ.
 bool is_same_lens(const Imager& a, const Imager& b);
@@ -31,10 +33,11 @@ class SceneCache {
   enum class FromProjectors { nothing, prototype, all };
   /// Sets all poses and draws the projectors' ids.
   void prepare(const scene::PosedScene& posed, FromProjectors needed);
-  /// Draws the ids that a viewer or an imager sees of the prepared scene; `parts_alone`: only where parts may
-  /// be.
+  /// Draws the ids that a viewer or an imager sees of the prepared scene.
   void draw_from_viewer(const Imager& viewer);
-  void draw_from_imager(const Imager& imager, bool parts_alone = false);
+  void draw_from_imager(const Imager& imager);
+  /// The same only where the imager sees something within `around_m` of the meshes `over`.
+  void draw_from_imager_over(const Imager& imager, const std::vector<PlacedRun>& over, double around_m);
   /// Draws the ids that the reference camera sees of the prepared scene, and keeps them.
   void draw_from_reference_camera(const Imager& camera);
 
@@ -56,7 +59,9 @@ class SceneCache {
   GLuint stamp() const { return prototype_moves_ + occlusion_.changes() + 1; }
 
  private:
+  enum class ViewpointKind { none, imager, places_of_imager, viewer };
   SceneCache(const scene::Scene& scene, const Rig& rig, VisibilityBuffers visibility, PassTimes* times);
+  bool is_drawn_from(ViewpointKind kind, const Imager& imager) const;
 
   GpuScene scene_;
   VisibilityBuffers visibility_;
@@ -69,9 +74,10 @@ class SceneCache {
   bool is_prototype_drawn_ = false, are_soft_edges_drawn_ = false, are_surface_parts_drawn_ = false;
   std::vector<PlacedRun> runs_;
   Pose scene_from_world_;
-  enum class ViewpointKind { none, imager, parts_of_imager, viewer };
   ViewpointKind viewpoint_kind_ = ViewpointKind::none;
   Imager viewpoint_imager_;
+  std::vector<PlacedRun> viewpoint_over_;  // with places_of_imager: the arguments of draw_from_imager_over
+  double viewpoint_around_m_ = 0;
   std::vector<std::pair<Imager, GpuLens>> lenses_;  // lenses of cameras and viewers, the newest last
 };
 

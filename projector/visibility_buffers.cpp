@@ -90,6 +90,12 @@ std::array<Eigen::Vector3d, 8> corners_of(const Eigen::AlignedBox3d& box) {
   return corners;
 }
 
+// Whether the front faces of a mesh hide all its back faces from a pinhole, so that these need not be drawn.
+bool hides_back_faces(const PlacedRun& placed, const Pose& pinhole_from_owner) {
+  const Eigen::AlignedBox3d box(placed.run->p_lower, placed.run->p_upper);
+  return placed.run->is_solid && box.exteriorDistance(pinhole_from_owner.inverse().translation) > k_near;
+}
+
 cv::Rect whole_of(const PinholeView& pinhole) { return {0, 0, pinhole.width, pinhole.height}; }
 
 // The texels of a pinhole view that contain `rect`.
@@ -220,7 +226,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
   glEnable(GL_DEPTH_TEST);
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GREATER);
-  glDisable(GL_CULL_FACE);
+  glCullFace(GL_FRONT);  // rows run downwards, so that GL takes back faces for front faces
   glDisable(GL_BLEND);
   glBindVertexArray(scene.vertex_array());
   const TangentRect rect = covered(pinhole);
@@ -230,6 +236,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
   for (const PlacedRun& placed : runs) {
     if (!wanted(placed)) continue;
     const Pose pinhole_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
+    (hides_back_faces(placed, pinhole_from_owner) ? glEnable : glDisable)(GL_CULL_FACE);
     const Eigen::Matrix4d clip_from_owner = clip_from_pinhole(pinhole) * pinhole_from_owner.matrix();
     const Program& program = placed.run->has_cut_outs ? cut_program_ : program_;
     scene.bind({Resource::scene, GL_READ_ONLY, program});
@@ -252,6 +259,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
     draw_triangles(first, count);
   }
   glDisable(GL_DEPTH_TEST);
+  glDisable(GL_CULL_FACE);
   glFlush();  // softpipe makes drawn ids visible to compute programs only after a flush
 }
 
@@ -317,10 +325,34 @@ void VisibilityBuffers::draw_from_imager(const GpuScene& scene,
                                          const std::vector<PlacedRun>& runs,
                                          const Pose& scene_from_world,
                                          const Imager& imager,
-                                         const BakedLens& lens,
-                                         bool parts_alone) {
+                                         const BakedLens& lens) {
   const Pose pose = imager_from_scene(imager, scene_from_world);
-  const TangentRect rect = intersected(lens.rect, spanned_by(pose, runs, parts_alone ? is_part : is_any));
+  draw_within(scene, runs, scene_from_world, imager, intersected(lens.rect, spanned_by(pose, runs, is_any)));
+}
+
+void VisibilityBuffers::draw_from_imager_over(const GpuScene& scene,
+                                              const std::vector<PlacedRun>& runs,
+                                              const Pose& scene_from_world,
+                                              const Imager& imager,
+                                              const BakedLens& lens,
+                                              const std::vector<PlacedRun>& over,
+                                              double around_m) {
+  const Pose pose = imager_from_scene(imager, scene_from_world);
+  TangentRect rect = tangents_spanned(pose, {});
+  for (const PlacedRun& run : over) rect = united(rect, tangents_spanned(pose, bounds_of(run, around_m)));
+  // `visible_rects` has a margin (pixels_of), and samples read some pixels beyond it.
+  constexpr double k_margin_px = 16;
+  const Eigen::Vector2d margin(k_margin_px / imager.lens.fx(), k_margin_px / imager.lens.fy());
+  if (!rect.is_empty()) rect = {rect.lower - margin, rect.upper + margin};
+  draw_within(scene, runs, scene_from_world, imager, intersected(lens.rect, rect));
+}
+
+void VisibilityBuffers::draw_within(const GpuScene& scene,
+                                    const std::vector<PlacedRun>& runs,
+                                    const Pose& scene_from_world,
+                                    const Imager& imager,
+                                    const TangentRect& rect) {
+  const Pose pose = imager_from_scene(imager, scene_from_world);
   const PinholeView pinhole =
       pinhole_view_over(pose, rect, k_oversampling * imager.lens.fx(), k_viewer_ids_side, k_viewer_ids_side);
   draw(scene, runs, is_prototype, pinhole, whole_of(pinhole), viewer_ids_, 0);

@@ -43,13 +43,21 @@ class VisibilityBuffers final : public Bindable {
   void draw_surface_parts_from_projectors(const GpuScene& scene,
                                           const std::vector<PlacedRun>& runs,
                                           const Pose& scene_from_world);
-  /// Draws the ids from an imager's own position, over its image. `parts_alone`: only where parts may be.
+  /// Draws the ids from an imager's own position, over its image.
   void draw_from_imager(const GpuScene& scene,
                         const std::vector<PlacedRun>& runs,
                         const Pose& scene_from_world,
                         const Imager& imager,
-                        const BakedLens& lens,
-                        bool parts_alone);
+                        const BakedLens& lens);
+  /// The same only for the pixels that see something within `around_m` of the meshes `over`, and for some
+  /// pixels around these.
+  void draw_from_imager_over(const GpuScene& scene,
+                             const std::vector<PlacedRun>& runs,
+                             const Pose& scene_from_world,
+                             const Imager& imager,
+                             const BakedLens& lens,
+                             const std::vector<PlacedRun>& over,
+                             double around_m);
   /// Draws the ids from a viewer's position, over its view parts, at the resolution at which the projectors
   /// show them. `d_up_scene` is any direction that is not parallel to the viewing direction.
   void draw_from_viewer(const GpuScene& scene,
@@ -106,6 +114,11 @@ class VisibilityBuffers final : public Bindable {
   PinholeView projector_pinhole_view(std::size_t projector,
                                      const std::vector<PlacedRun>& runs,
                                      const Pose& scene_from_world) const;
+  void draw_within(const GpuScene& scene,
+                   const std::vector<PlacedRun>& runs,
+                   const Pose& scene_from_world,
+                   const Imager& imager,
+                   const TangentRect& rect);
   void send(int index, const GpuViewpoint& viewpoint);
   void upload_pixel_map(int layer, const Imager& imager, const TangentRect& rect);
 

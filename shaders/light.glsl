@@ -111,7 +111,9 @@ bool may_give_light(ivec2 at) {
   may_give = may_give || ids_around(s_viewer_ids, viewer, 1, p - viewer.p_origin.xyz, share) != uvec4(0);
 #endif
 #ifdef SURFACE_PARTS
-  may_give = may_give || may_hold_surface_part(p, u_placement_count);
+  if (!may_give && may_hold_surface_part(p, u_placement_count)) {
+    may_give = may_meet_surface_part(s_projector_ids, viewpoint_at(u_projector), p, smooth_normal_in_owner(prototype));
+  }
 #endif
   return may_give;
 }

@@ -24,6 +24,25 @@ int steps_along_normal(Viewpoint viewpoint, vec3 p, vec3 d_normal) {
   return int(clamp(ceil(length(px) - 0.25), 0.0, k_most_steps));
 }
 
+// A point of the line along the normal that is searched, relative to the viewpoint: at heights 0, 1, -1, 2, -2
+// and so on, in steps.
+vec3 along_normal(Viewpoint viewpoint, vec3 p, vec3 d_normal, int height, int steps) {
+  float along = float((height + 1) / 2) * (height % 2 == 1 ? 1.0 : -1.0) / float(max(steps, 1));
+  return p + along * k_on_surface * d_normal - viewpoint.p_origin.xyz;
+}
+
+// Whether the projector's id image shows any part around the line along the normal. If not, surface_part_at
+// finds none.
+bool may_meet_surface_part(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p, vec3 d_normal) {
+  int steps = steps_along_normal(viewpoint, p, d_normal), height = 0;
+  bool may_meet = false;
+  do {
+    vec4 share;
+    may_meet = ids_around(s_ids, viewpoint, 1, along_normal(viewpoint, p, d_normal, height, steps), share) != uvec4(0);
+  } while (!may_meet && ++height <= 2 * steps);
+  return may_meet;
+}
+
 // Whether a part covers the point p of the plane of a triangle that is thinner than a texel, as first_hit has
 // it.
 bool is_covered_by_thin(usampler2DArray s_ids, Viewpoint viewpoint, Hit missed, vec3 p) {
@@ -48,9 +67,7 @@ Hit surface_part_at(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p, vec3 d_n
   int height = 0;
   do {
     vec4 share;
-    // Heights 0, 1, -1, 2, -2 and so on, in steps.
-    float along = float((height + 1) / 2) * (height % 2 == 1 ? 1.0 : -1.0) / float(max(steps, 1));
-    vec3 d = p + along * k_on_surface * d_normal - viewpoint.p_origin.xyz;
+    vec3 d = along_normal(viewpoint, p, d_normal, height, steps);
     uvec4 ids = ids_around(s_ids, viewpoint, 1, d, share);
     if (height == 0) in_middle = all(notEqual(ids, uvec4(0)));
     for (int k = 0; k < 4; ++k)

@@ -684,6 +684,93 @@ TEST_F(RendererTest, WhatMovesIsDrawnQuicklyAndWholeOnceItStandsStill) {
   EXPECT_EQ(cv::norm(drawn.projector_image(0, moved, viewer), whole, cv::NORM_INF), 0);
 }
 
+// Only the places of parts that changed are drawn again; the rest is kept.
+TEST_F(RendererTest, CompositeOfWhatChangedIsThatOfANewRenderer) {
+  const Scene scene =
+      scene_of(sheet(0.8, 0.6),
+               {slot("near", scene::Mode::view, coloured(sheet(0.12, 0.1, -0.08), {0.5f, 0.4f, 0.3f})),
+                slot("far", scene::Mode::view, coloured(sheet(0.15, 0.08, -0.05), {0.1f, 0.6f, 0.2f})),
+                slot("decal", scene::Mode::surface, coloured(sheet(0.2, 0.05), {0.2f, 0.3f, 0.8f}))});
+  PosedScene posed = posed_at_origin(scene);
+  posed.parts[1].world_from_part.translation.x() = 0.16;
+  posed.parts[2].world_from_part.translation.y() = 0.12;
+  const auto moved_by = [&](std::size_t part, const Vector3d& by) {
+    return [&posed, part, by] { posed.parts[part].world_from_part.translation += by; };
+  };
+  const std::vector<std::function<void()>> changes = {
+      [] {},
+      moved_by(0, {0.05, 0, 0}),  // before the other part
+      moved_by(0, {0, 0.13, 0}),  // before the decal
+      moved_by(1, {-0.3, 0, 0.02}),
+      moved_by(0, {-0.2, 0, 0}),
+      [&] { posed.parts[1].material.base_colour = Vector3d(1, 0, 0); },
+      [&] { posed.parts.erase(posed.parts.begin()); },
+      [&] {
+        posed.world_from_prototype = Pose(exp_rotation({0, 0, 0.1}), {0.02, 0, 0});
+      }};
+  const cv::Mat image(480, 640, CV_8UC3, cv::Scalar(9, 20, 30));
+  Renderer kept = renderer(scene, two_projectors());
+  cv::Mat before;
+  for (const Composite what : {Composite::full, Composite::rest}) {
+    const PosedScene first = posed;
+    for (std::size_t i = 0; i < changes.size(); ++i) {
+      changes[i]();
+      const cv::Mat drawn = kept.composite(0, image, posed, what);
+      const cv::Mat anew = renderer(scene, two_projectors()).composite(0, image, posed, what);
+      // The ids of the two have other texels. So samples at outlines may differ, but no patch of 3 x 3
+      // pixels.
+      cv::Mat apart, patches;
+      cv::extractChannel(cv::abs(drawn - anew) > 2, apart, 1);
+      cv::morphologyEx(apart, patches, cv::MORPH_OPEN, cv::Mat::ones(3, 3, CV_8U));
+      EXPECT_LE(cv::countNonZero(apart), 200) << "change " << i;
+      EXPECT_EQ(cv::countNonZero(patches), 0) << "change " << i;
+      const bool is_change_seen =
+          i == 0 || what == Composite::rest || cv::norm(drawn, before, cv::NORM_INF) > 20;
+      EXPECT_TRUE(is_change_seen) << "change " << i;
+      before = drawn;
+    }
+    posed = first;
+  }
+}
+
+// The same surface must be seen whether the mesh bounds a solid, whose back faces are not drawn, or is known
+// not to: with a hole that nobody sees, or inside out.
+TEST_F(RendererTest, BackFacesOfASolidChangeNothing) {
+  Mesh solid = coloured(sheet(0.5, 0.4), {1, 1, 1});
+  solid.positions.clear();
+  solid.triangles.clear();
+  for (int i = 0; i < 8; ++i)
+    solid.positions.emplace_back(i & 1 ? 0.25f : -0.25f, i & 2 ? 0.2f : -0.2f, i & 4 ? 0.1f : 0.f);
+  for (const auto& [a, b, c, d] : std::vector<std::array<std::uint32_t, 4>>{
+           {4, 5, 7, 6}, {0, 2, 3, 1}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}}) {
+    solid.triangles.push_back({a, b, c});
+    solid.triangles.push_back({a, c, d});
+  }
+  solid.normals.assign(8, {0, 0, -1});
+  solid.uvs.assign(8, {0, 0});
+  solid.triangle_materials.assign(solid.triangles.size(), 0);
+  Mesh open = solid, inside_out = solid;
+  open.triangles.erase(open.triangles.begin());  // of the side that faces away
+  open.triangle_materials.pop_back();
+  for (auto& triangle : inside_out.triangles) std::swap(triangle[0], triangle[1]);
+  const auto points_of = [&](const Mesh& mesh) {
+    const Scene scene = scene_of(mesh, {});
+    return renderer(scene, two_projectors()).surface_points(0, posed_at_origin(scene));
+  };
+  const cv::Mat expected = points_of(open);
+  const cv::Mat is_seen = expected == expected;  // NaN where there is nothing
+  for (const Mesh* mesh : {&solid, &inside_out}) {
+    cv::Mat found = points_of(*mesh), wanted = expected.clone();
+    EXPECT_EQ(cv::norm(found == found, is_seen, cv::NORM_INF), 0);
+    cv::patchNaNs(found, 0);
+    cv::patchNaNs(wanted, 0);
+    EXPECT_LT(cv::norm(found, wanted, cv::NORM_INF), 1e-6);
+  }
+  cv::Mat one;
+  cv::extractChannel(is_seen, one, 0);
+  EXPECT_GT(cv::countNonZero(one), 60000);
+}
+
 TEST_F(RendererTest, SceneWithoutPrototypeOrProjectorsIsClassicAugmentedReality) {
   Scene scene;
   scene.slots = {slot("mirror", scene::Mode::view, coloured(sheet(0.1, 0.1), {0, 1, 0}))};
