@@ -125,8 +125,10 @@ Status play(const CalibrateOptions& options,
     std::fflush(stdout);
   };
   // The size that was entered when these captures were begun counts, unless another one is given now.
+  // Captures of others are refused later, with the reason.
   if (!plan.captures.board_measured) {
-    LIMN_TRY(plan.captures.board_measured, calib::stored_board_measured(plan.captures.folder));
+    if (const auto stored = calib::stored_board_measured(plan.captures.folder))
+      plan.captures.board_measured = *stored;
   }
   LIMN_TRY(plan.captures.board_measured, wizard::measured_board(plan.captures, options.board_measured));
   const wizard::WizardWork work = [&](const wizard::WizardBackend& where,

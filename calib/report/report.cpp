@@ -35,8 +35,8 @@ std::string provenance(const Report& report, const SolveOptions& options) {
 
 bool note_cad_size(const ScanSize& size, Report* report) {
   const Board& board = report->observed.observations.board;
-  const bool is_told = size.stddev > 0 && size.stddev <= expected_growth(board, {}).stddev;
-  if (!is_told || board.is_exact || report->scale_rests_on != "board") return false;
+  const bool shows_size = size.stddev > 0 && size.stddev <= expected_growth(board, {}).stddev;
+  if (!shows_size || board.is_exact || report->scale_rests_on != "board") return false;
   const bool is_wrong = contradicts(size);
   if (is_wrong)
     add_faults(

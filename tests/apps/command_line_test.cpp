@@ -394,7 +394,7 @@ TEST_F(CommandLine, ConfigsWithAnyValueSpoiledNeverCrash) {
 
 TEST_F(CommandLine, BenchNamesTheBenchesThereAre) {
   expect({"bench", "tracking"}, 2,
-         {"tracking", "tracker, id, calib, solve, projector, live, remote, tablet"});
+         {"tracking", "tracker, id, calib, solve, projector, live, prediction, remote, tablet"});
 }
 
 TEST_F(CommandLine, BenchSaysWhichProgramIsMissing) {  // there is none beside the test program
