@@ -9,7 +9,7 @@ namespace limn::tracker {
 struct Ball {
   Eigen::Vector3d d_centre =
       Eigen::Vector3d::UnitZ();  ///< unit direction of the sphere's centre, camera frame
-  double half_angle = 0;         ///< of the outline's cone, radians
+  double half_angle = 0;         ///< the outline's cone's, radians
   /// The raw pixel that d_centre projects to, and its covariance (px^2). It comes from the residuals of the
   /// outline's pixels, and is widened where the residuals agree with each other along the outline.
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();

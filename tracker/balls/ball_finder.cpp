@@ -12,7 +12,7 @@ constexpr std::size_t k_most_points = 64;  // points of a boundary that the cone
 // An ellipse's area over that of its box is pi / 4 when its axes are upright, and less when they are oblique.
 // Small ones made of whole pixels fill more.
 constexpr double k_least_fill = 0.55, k_most_fill = 0.82, k_fill_by_px = 0.9;
-constexpr double k_most_elongation = 3;  // of the box; a sphere 70 degrees off the axis of a pinhole
+constexpr double k_most_elongation = 3;  // the box's; a sphere 70 degrees off the axis of a pinhole
 // Boundaries run along pixels, which is an error of .3 px; shade on the sphere moves them, too.
 constexpr double k_most_rms_px = 0.5, k_most_rms_share = 0.03;
 
@@ -55,7 +55,7 @@ std::optional<BallOutline> BallFinder::outline(const Contours::Extent& extent, c
   const double half_angle = sum / number;
   const auto centre = lens.project(axis);
   if (!centre || !(half_angle < 1.2)) return std::nullopt;
-  // Of a circle of the same area in the image.
+  // The radius of a circle with the same area in the image.
   const double radius_px = std::sqrt(extent.area / std::numbers::pi), px_per_radian = radius_px / half_angle;
   const double rms_px = px_per_radian * std::sqrt(std::max(0.0, squares / number - half_angle * half_angle));
   if (!(rms_px < k_most_rms_px + k_most_rms_share * radius_px)) return std::nullopt;

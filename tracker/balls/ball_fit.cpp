@@ -29,8 +29,8 @@ constexpr double k_first_blur_px = 0.8;
 constexpr double k_least_blur_px = 0.25, k_most_blur_px = 8;  // that of a pixel's own area is .29
 // How far pixels on both sides of the outline are used: in its blur, and beyond it.
 constexpr double k_reach_blurs = 2.5, k_reach_px = 1.2;
-constexpr double k_most_inside_share = 0.7;  // of the radius: what lies deeper may be printed or shiny
-constexpr std::size_t k_most_pixels = 900;   // of large spheres only a part is used
+constexpr double k_most_inside_share = 0.7;  // share of the radius: what lies deeper may be printed or shiny
+constexpr std::size_t k_most_pixels = 900;   // only a part of a large sphere's is used
 constexpr std::size_t k_least_pixels = 40;
 constexpr int k_max_steps = 15;
 constexpr double k_settled_px = 1e-3;
@@ -47,7 +47,7 @@ constexpr int k_most_weak_sectors = 3;
 constexpr double k_most_stddev_px = 0.3;
 // The radius is known to this at best: pixels and blur are not quite Gaussian.
 constexpr double k_systematic_radius_px = 0.03;
-constexpr double k_most_shift_share = 0.5;  // of the radius, plus a pixel: from the start to the result
+constexpr double k_most_shift_share = 0.5;  // share of the radius, plus a pixel: from the start to the result
 constexpr double k_smallest_radius_px = 2.5;
 
 // sqrt(max(0, x)), blurred by a Gaussian of sigma 1.
@@ -123,7 +123,7 @@ struct BallFitter::State {
   Eigen::Vector3d d_centre = Eigen::Vector3d::UnitZ();
   Eigen::Matrix<double, 3, 2> d_by_px = Eigen::Matrix<double, 3, 2>::Zero();
   Eigen::Matrix2d px_by_angles = Eigen::Matrix2d::Identity();
-  double px_per_radian = 1;  // of the start: the unit of the radius
+  double px_per_radian = 1;  // at the start; it gives the radius its unit
 
   double half_angle() const { return radius_px / px_per_radian; }
   // Finds the direction of the centre's pixel. False when it has none.
