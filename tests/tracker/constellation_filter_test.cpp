@@ -4,6 +4,7 @@
 
 #include "tests/support/matchers.h"
 #include "tests/tracker/crossing_balls.h"
+#include "tracker/predict.h"
 
 namespace limn::tracker {
 namespace {
@@ -17,6 +18,28 @@ TEST(ConstellationFilter, CrossingConstellationsKeepTheirIdentities) {
   EXPECT_EQ(count.elsewhere, 0);
   EXPECT_GT(count.visible, 400);  // the hands are near each other: balls hide each other half of the time
   EXPECT_GT(count.reported, count.visible * 4 / 10);  // after a hidden ball, ten images confirm a triangle
+}
+
+// Ten images confirm three balls in one camera; four balls need none.
+TEST(ConstellationFilter, ThreeBallsAreReportedWhenTheyAreConfirmed) {
+  auto rng = test::test_rng();
+  const Imager camera = test::camera_1080p();
+  const Pose truth(exp_rotation({0.4, 0.3, 0}), {0, 0, 1.6});
+  for (const Constellation& constellation : {test::triangle(), test::five_balls()}) {
+    std::vector<BodyFilter> known;
+    int first_reported = -1;
+    for (int i = 0; i < 20; ++i) {
+      const Stamp at = shifted(Stamp{} + std::chrono::seconds(1), i / 60.0);
+      const std::vector<Ball> balls = test::balls_seen({{constellation, truth}}, camera, 0.03, rng);
+      const BallView view{&camera, balls};
+      known = observed(known, std::vector{constellation}, std::span(&view, 1), at);
+      const std::vector<Track> tracks = predicted(known, at, Prediction::filtered);
+      if (tracks.empty() || first_reported >= 0) continue;
+      first_reported = i;
+      EXPECT_TRUE(test::pose_near(tracks[0].world_from_body, truth, 1_deg, 1_mm));
+    }
+    EXPECT_EQ(first_reported, constellation.p_balls.size() == 3 ? 10 : 0);
+  }
 }
 
 // The sizes of three balls that are seen with noise leave several poses open in one image; while the triangle
