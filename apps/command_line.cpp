@@ -18,11 +18,13 @@
 #include "apps/check.h"
 #include "apps/demo.h"
 #include "apps/detect.h"
+#include "apps/detect_balls.h"
 #include "apps/doctor.h"
 #include "apps/export.h"
 #include "apps/import.h"
 #include "apps/import_rig.h"
 #include "apps/learn_body.h"
+#include "apps/learn_constellation.h"
 #include "apps/live.h"
 #include "apps/markers.h"
 #include "apps/output_files.h"
@@ -110,6 +112,8 @@ void add_markers(CLI::App& app, Run& run) {
       "holder.json)\n"
       "Example: limn markers --learn-body photos/*.jpg --camera camera0.cameramodel --family aruco_4x4_50 "
       "--size-mm 40 --out body.json\n"
+      "Example: limn markers --learn-constellation photos/*.jpg --camera camera0.cameramodel --ball-mm 40 "
+      "--out wand.json\n"
       "Example: limn markers --train photo.jpg --out logo.patt\n"
       "Example: limn markers --compare logo.patt hiro.patt");
   auto options = std::make_shared<MarkersOptions>();
@@ -130,10 +134,30 @@ void add_markers(CLI::App& app, Run& run) {
   auto* learn = command->add_option(
       "--learn-body", learning->images,
       "Instead of a sheet: measure from these photographs where the markers of a rigid body are on it");
+  command->add_option(
+      "--camera", learning->camera,
+      "With --learn-body and --learn-constellation: camera file (.cameramodel or another format)");
+  auto balls = std::make_shared<LearnConstellationOptions>();
+  auto* learn_balls =
+      command
+          ->add_option("--learn-constellation", balls->images,
+                       "Instead of a sheet: measure from these photographs where the balls of a "
+                       "rigid body are on it")
+          ->excludes(learn);
+  command->add_option("--ball-mm", balls->ball_mm, "With --learn-constellation: diameter of the balls in mm")
+      ->needs(learn_balls)
+      ->capture_default_str();
+  add_choice(command, "--shade", &balls->shade, tracker::k_ball_shades,
+             "With --learn-constellation: whether the balls are brighter or darker than what is around them")
+      ->needs(learn_balls);
+  add_choice(command, "--encoding", &balls->encoding, tracker::k_encodings,
+             "With --learn-constellation: encoding of grey levels: linear (proportional to light) or srgb "
+             "(webcams, photographs)")
+      ->needs(learn_balls);
   command
-      ->add_option("--camera", learning->camera,
-                   "With --learn-body: camera file (.cameramodel or another format)")
-      ->needs(learn);
+      ->add_option("--others", balls->others,
+                   "With --learn-constellation: constellation files that the new one must differ from")
+      ->needs(learn_balls);
   auto* train =
       command->add_option("--train", options->train,
                           "Instead of a sheet: make a template from the one black frame in this image");
@@ -156,8 +180,16 @@ void add_markers(CLI::App& app, Run& run) {
   command->add_option(
       "--out", options->out,
       "File to write: .pdf or .svg, for a board also .png, for a body .json, for a template .patt");
-  command->callback([options, learning, &run] {
-    run = [options, learning] {
+  command->callback([options, learning, balls, &run] {
+    run = [options, learning, balls] {
+      if (!balls->images.empty()) {
+        balls->camera = learning->camera;
+        balls->out = options->out;
+        return report_result(run_learn_constellation(*balls));
+      }
+      if (learning->images.empty() && !learning->camera.empty())
+        return report_result(
+            usage_error("--camera: expected --learn-body or --learn-constellation with it."));
       if (learning->images.empty()) return report_result(run_markers(*options));
       learning->family = options->family;
       learning->size_mm = options->size_mm;
@@ -168,10 +200,12 @@ void add_markers(CLI::App& app, Run& run) {
 }
 
 void add_detect(CLI::App& app, Run& run) {
-  auto* command = app.add_subcommand("detect", "Find markers and their poses in images");
+  auto* command =
+      app.add_subcommand("detect", "Find markers, or constellations of balls, and their poses in images");
   command->footer(
       "Example: limn detect photo.jpg --family aruco_6x6_250 --camera camera0.cameramodel --size-mm 40 "
-      "--draw out");
+      "--draw out\n"
+      "Example: limn detect photo.jpg --constellation wand.json --camera camera0.cameramodel");
   auto options = std::make_shared<DetectOptions>();
   command
       ->add_option(
@@ -196,9 +230,10 @@ void add_detect(CLI::App& app, Run& run) {
              "How poses are computed: ippe, or triangle (the method of the 2011 paper)");
   add_choice(command, "--encoding", &options->encoding, tracker::k_encodings,
              "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)");
-  command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
+  auto* csv = command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
   command->add_option("--json", options->json, "JSON file to write: corners, poses, covariances");
-  command->add_option("--draw", options->draw, "Folder for copies of the images with the markers drawn in");
+  auto* draw = command->add_option("--draw", options->draw,
+                                   "Folder for copies of the images with the markers drawn in");
   command
       ->add_option("--threads", options->threads,
                    "Number of images to process at the same time; with one image or --repeat, number of "
@@ -209,7 +244,28 @@ void add_detect(CLI::App& app, Run& run) {
       ->add_option("--repeat", options->repeat,
                    "Also measure the median time in ms of N detections in memory (0: do not)")
       ->check(CLI::Range(0, 1000000));
-  command->callback([options, &run] { run = [options] { return report_result(run_detect(*options)); }; });
+  auto balls = std::make_shared<DetectBallsOptions>();
+  auto* constellation =
+      command
+          ->add_option("--constellation", balls->constellations,
+                       "Find these constellations of balls instead of markers (files of limn markers "
+                       "--learn-constellation), separated by commas")
+          ->delimiter(',')
+          ->excludes(csv)
+          ->excludes(draw);
+  add_choice(command, "--shade", &balls->shade, tracker::k_ball_shades,
+             "With --constellation: whether the balls are brighter or darker than what is around them")
+      ->needs(constellation);
+  command->callback([options, balls, &run] {
+    run = [options, balls] {
+      if (balls->constellations.empty()) return report_result(run_detect(*options));
+      balls->images = options->images;
+      balls->camera = options->camera;
+      balls->encoding = options->encoding;
+      balls->json = options->json;
+      return report_result(run_detect_balls(*balls));
+    };
+  });
 }
 
 void add_bench(CLI::App& app, Run& run) {

@@ -4,10 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "apps/camera_image.h"
 #include "core/camera_files/imager_file.h"
 #include "core/config.h"
 #include "core/file.h"
-#include "core/image_io.h"
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/print.h"
@@ -18,18 +18,6 @@ namespace limn::apps {
 namespace {
 
 constexpr double k_degrees = 180 / std::numbers::pi;
-
-Result<std::vector<tracker::Detection>> found_in(const std::filesystem::path& path,
-                                                 const Imager& camera,
-                                                 tracker::Detector* detector) {
-  LIMN_TRY(const cv::Mat grey, read_grey_image(path));
-  if (camera.width > 0 && (grey.cols != camera.width || grey.rows != camera.height))
-    return error(
-        "{}: expected an image of the camera's size {}x{}, found {}x{}. Use images of the same camera and "
-        "mode.",
-        path.string(), camera.width, camera.height, grey.cols, grey.rows);
-  return detector->detect(grey, &camera.lens);
-}
 
 // Three consecutive standard deviations, one for each axis of the body.
 nlohmann::ordered_json deviations(const Matrix6d& covariance, int first, double scale) {
@@ -89,8 +77,8 @@ Status run_learn_body(const LearnBodyOptions& options) {
   at_origin.imager_from_world = Pose{};
   Progress progress("detect", static_cast<int>(options.images.size()));
   for (const auto& path : options.images) {
-    LIMN_TRY(auto found, found_in(path, camera, &detector));
-    detections.push_back(std::move(found));
+    LIMN_TRY(const cv::Mat grey, read_image_of(camera, path));
+    detections.push_back(detector.detect(grey, &camera.lens));
     progress.step(static_cast<int>(detections.size()));
   }
   std::vector<tracker::View> views;

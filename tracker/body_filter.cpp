@@ -26,6 +26,9 @@ constexpr double k_same_branch = 0.02;
 // exceeds it with a probability of 1e-10.
 constexpr double k_max_excess = 60;
 constexpr int k_misfits_believed = 2;
+// A pose that the filter has lost as a branch, and that the sizes of balls suit better by this much, becomes
+// a branch again, of this weight relative to the reported one.
+constexpr double k_better_by = 6, k_returned_weight = 0.05;
 // While there is one branch, a second is searched for once in this many images.
 constexpr int k_second_every = 3;
 // Standard deviations of velocity and acceleration of a body that has just come into view (k_seen), and of
@@ -34,6 +37,21 @@ constexpr double k_seen_turn = 2, k_seen_speed = 0.5;                     // rad
 constexpr double k_seen_turn_acceleration = 15, k_seen_acceleration = 3;  // rad/s², m/s²
 constexpr double k_start_turn = 0.5, k_start_speed = 0.1;
 constexpr double k_start_turn_acceleration = 10, k_start_acceleration = 2;
+
+class MarkerEvidence : public BodyEvidence {
+ public:
+  explicit MarkerEvidence(BodyCorrespondences seen) : seen_(std::move(seen)) {}
+  ChosenCorners points_at(const Pose& world_from_body) const override {
+    return corners_at(seen_, world_from_body);
+  }
+  double further_cost(const Pose&) const override { return 0; }
+  std::vector<PoseFit> minima(std::span<const Pose> predicted, Minima wanted) const override {
+    return tracker::minima(seen_, predicted, wanted);
+  }
+
+ private:
+  BodyCorrespondences seen_;
+};
 
 struct Rates {
   double turn, speed, turn_acceleration, acceleration;
@@ -65,9 +83,9 @@ Branch started(const PoseFit& fit) {
   return {still, roused(still, k_seen), 0.5, 1};
 }
 
-std::optional<PoseFit> posterior(const BodyCorrespondences& seen, const Motion& prior, const Pose& start) {
+std::optional<PoseFit> posterior(const BodyEvidence& seen, const Motion& prior, const Pose& start) {
   const PosePrior known = prior_of(prior);
-  return fit_pose(corners_at(seen, start).observations, start, k_huber, &known);
+  return fit_pose(seen.points_at(start).observations, start, k_huber, &known);
 }
 
 // A branch, predicted to the time of the new images.
@@ -98,7 +116,7 @@ struct Update {
 };
 
 // nullopt when no pose near the forecast suits the corners.
-std::optional<Update> updated(const Forecast& at, const BodyCorrespondences& seen) {
+std::optional<Update> updated(const Forecast& at, const BodyEvidence& seen) {
   const auto still = posterior(seen, at.still, at.still.world_from_body);
   const auto moving = posterior(seen, at.moving, at.moving.world_from_body);
   if (!moving) return std::nullopt;
@@ -111,21 +129,25 @@ std::optional<Update> updated(const Forecast& at, const BodyCorrespondences& see
   branch.moving = corrected(at.moving, *moving);
   branch.still = still ? corrected(at.still, *still) : halted(branch.moving);
   branch.still_weight = std::clamp(std::exp(log_still - highest) / sum, 1e-9, 1 - 1e-9);
-  return Update{branch, std::log(at.weight) + highest + std::log(sum), *moving};
+  const double further = 0.5 * seen.further_cost(moving->world_from_body);
+  return Update{branch, std::log(at.weight) + highest + std::log(sum) - further, *moving};
 }
 
-// The posterior's second mode, when it has one near another minimum of the corners' own error. This restores
-// the second branch after a frontal view, in which both branches are the same.
-std::optional<Update> second_mode(const Forecast& at,
-                                  const Update& first,
-                                  const BodyCorrespondences& seen,
-                                  std::span<const PoseFit> fits) {
+// A further mode of the posterior, when it has one near another minimum of the points' own error. This
+// restores a branch after a view in which two branches are the same (for a marker, a frontal one).
+std::optional<Update> further_mode(const Forecast& at,
+                                   std::span<const Update> known,
+                                   const BodyEvidence& seen,
+                                   std::span<const PoseFit> fits) {
   for (const PoseFit& fit : fits) {
     const auto mode = posterior(seen, at.moving, fit.world_from_body);
-    if (!mode ||
-        angle_between(mode->world_from_body.rotation, first.moving.world_from_body.rotation) < k_same_branch)
+    if (!mode || std::ranges::any_of(known, [&](const Update& other) {
+          return angle_between(mode->world_from_body.rotation, other.moving.world_from_body.rotation) <
+                 k_same_branch;
+        }))
       continue;
-    const double log_weight = std::log(at.weight * (1 - at.still_share)) + log_evidence(at.moving, *mode);
+    const double log_weight = std::log(at.weight * (1 - at.still_share)) + log_evidence(at.moving, *mode) -
+                              0.5 * seen.further_cost(mode->world_from_body);
     return Update{started(fit), log_weight, *mode};
   }
   return std::nullopt;
@@ -147,7 +169,8 @@ std::vector<Branch> weighed(const std::vector<Update>& updates) {
     sum += branches.back().weight = std::max(k_least_weight, std::exp(update.log_weight - highest));
   }
   for (Branch& branch : branches) branch.weight /= sum;
-  if (branches.size() == 2 && branches[1].weight > k_change_at) std::swap(branches[0], branches[1]);
+  for (std::size_t i = 1; i < branches.size(); ++i)
+    if (branches[i].weight > k_change_at) std::swap(branches[0], branches[i]);
   return branches;
 }
 
@@ -158,14 +181,14 @@ const PoseFit& nearest_fit(std::span<const PoseFit> fits, const Pose& world_from
   });
 }
 
-void note_measured(const BodyCorrespondences& seen,
+void note_measured(const BodyEvidence& seen,
                    std::span<const PoseFit> fits,
                    Stamp captured_at,
                    BodyFilter* motion) {
   const PoseFit& fit = nearest_fit(fits, motion->branches.front().moving.world_from_body);
   motion->fixes.push_back({fit.world_from_body, fit.covariance, captured_at});
   if (motion->fixes.size() > 2) motion->fixes.erase(motion->fixes.begin());
-  motion->marker_count = corners_at(seen, fit.world_from_body).marker_count;
+  motion->marker_count = seen.points_at(fit.world_from_body).marker_count;
   motion->rms_px = fit.rms_px;
   motion->misfits = 0;
   motion->measured_at = motion->looked_at = captured_at;
@@ -176,75 +199,91 @@ double log_weight_alone(const PoseFit& fit) {
   return 0.5 * (std::log(fit.covariance.determinant()) - fit.chi_square);
 }
 
-BodyFilter started(const Body& body,
-                   const BodyCorrespondences& seen,
+BodyFilter started(const std::string& body,
+                   const BodyEvidence& seen,
                    std::span<const PoseFit> fits,
                    Stamp captured_at) {
   BodyFilter motion;
-  motion.body = body.name;
+  motion.body = body;
   std::vector<Update> updates;
   for (const PoseFit& fit : fits) updates.push_back({started(fit), log_weight_alone(fit), fit});
-  if (updates.size() == 2 && updates[1].log_weight > updates[0].log_weight) std::swap(updates[0], updates[1]);
+  const auto likeliest = std::ranges::max_element(updates, {}, &Update::log_weight);
+  std::iter_swap(updates.begin(), likeliest);
   motion.branches = weighed(updates);
   note_measured(seen, fits, captured_at, &motion);
   return motion;
 }
 
+// A minimum that is no branch although what else is seen suits it better: the prior of a wrong branch can be
+// so narrow that it leaves no mode there.
+std::optional<Update> returned(std::span<const Update> updates,
+                               const BodyEvidence& seen,
+                               std::span<const PoseFit> fits) {
+  const double now = seen.further_cost(updates.front().moving.world_from_body);
+  for (const PoseFit& fit : fits) {
+    const Update update{started(fit), updates.front().log_weight + std::log(k_returned_weight), fit};
+    if (now > seen.further_cost(fit.world_from_body) + k_better_by &&
+        std::ranges::none_of(updates, [&](const Update& other) { return are_one(update, other); }))
+      return update;
+  }
+  return std::nullopt;
+}
+
 // nullopt when the image contradicts the motion.
-std::optional<std::vector<Branch>> advanced(const BodyFilter& known,
-                                            const BodyCorrespondences& seen,
-                                            std::span<const PoseFit> fits,
-                                            double seconds,
-                                            const MotionModel& model) {
+std::optional<std::vector<Branch>> advanced_branches(const BodyFilter& known,
+                                                     const BodyEvidence& seen,
+                                                     std::span<const PoseFit> fits,
+                                                     double seconds,
+                                                     const MotionModel& model) {
   std::vector<Update> updates;
   std::vector<Forecast> forecasts;
   for (const Branch& branch : known.branches) {
     const Forecast at = forecast(branch, seconds, model);
     auto update = updated(at, seen);
-    if (!update || (!updates.empty() && are_one(*update, updates.front()))) continue;
+    if (!update || std::ranges::any_of(updates, [&](const Update& other) { return are_one(*update, other); }))
+      continue;
     updates.push_back(std::move(*update));
     forecasts.push_back(at);
   }
-  if (updates.size() == 2) {
-    const double before = std::log(forecasts[1].weight / forecasts[0].weight);
-    const double evidence = updates[1].log_weight - updates[0].log_weight - before;
-    updates[1].log_weight =
+  for (std::size_t i = 1; i < updates.size(); ++i) {
+    const double before = std::log(forecasts[i].weight / forecasts[0].weight);
+    const double evidence = updates[i].log_weight - updates[0].log_weight - before;
+    updates[i].log_weight =
         updates[0].log_weight + before + std::clamp(evidence, -k_most_evidence, k_most_evidence);
   }
   const bool suits = std::any_of(updates.begin(), updates.end(), [&](const Update& update) {
     return update.moving.chi_square < fits.front().chi_square + k_max_excess;
   });
   if (!suits) return std::nullopt;
-  if (updates.size() == 1 && fits.size() == 2)
-    if (auto second = second_mode(forecasts[0], updates[0], seen, fits))
-      updates.push_back(std::move(*second));
+  while (updates.size() < fits.size()) {
+    auto further = further_mode(forecasts[0], updates, seen, fits);
+    if (!further) break;
+    updates.push_back(std::move(*further));
+  }
+  if (auto better = returned(updates, seen, fits)) updates.push_back(std::move(*better));
   return weighed(updates);
 }
 
 BodyFilter seen_again(const BodyFilter& known,
-                      const Body& body,
-                      const BodyCorrespondences& seen,
+                      const BodyEvidence& seen,
                       Stamp captured_at,
                       const MotionModel& model) {
   BodyFilter after = known;
   after.looked_at = captured_at;
   const double unseen = seconds_between(known.measured_at, captured_at);
   const bool was_lost = unseen > lost_after_s(known, model);
-  std::vector<Pose> predictions;
-  if (!was_lost)
-    for (const Branch& branch : known.branches)
-      predictions.push_back(pose_after(branch.moving, std::min(unseen, model.extrapolation_limit_s)));
+  const std::vector<Pose> predictions = expected_poses(known, captured_at, model);
   after.of_one = known.branches.size() == 1 ? known.of_one + 1 : 0;
   const std::vector<PoseFit> fits =
-      minima(seen, predictions, after.of_one % k_second_every == 0 ? Minima::all : Minima::predicted);
+      seen.minima(predictions, after.of_one % k_second_every == 0 ? Minima::all : Minima::predicted);
   if (fits.empty()) return after;
-  if (was_lost) return started(body, seen, fits, captured_at);
-  if (auto branches = advanced(known, seen, fits, unseen, model)) {
+  if (was_lost) return started(known.body, seen, fits, captured_at);
+  if (auto branches = advanced_branches(known, seen, fits, unseen, model)) {
     after.branches = std::move(*branches);
     note_measured(seen, fits, captured_at, &after);
     return after;
   }
-  if (++after.misfits >= k_misfits_believed) return started(body, seen, fits, captured_at);
+  if (++after.misfits >= k_misfits_believed) return started(known.body, seen, fits, captured_at);
   return after;
 }
 
@@ -263,6 +302,33 @@ MotionNoise moving_noise(const MotionModel& model) {
   return {.turn_jerk = model.turn_jerk, .jerk = model.jerk};
 }
 
+std::vector<Pose> expected_poses(const BodyFilter& known, Stamp at, const MotionModel& model) {
+  std::vector<Pose> poses;
+  const double unseen = seconds_between(known.measured_at, at);
+  if (unseen > lost_after_s(known, model)) return poses;
+  for (const Branch& branch : known.branches)
+    poses.push_back(pose_after(branch.moving, std::clamp(unseen, 0.0, model.extrapolation_limit_s)));
+  return poses;
+}
+
+std::optional<BodyFilter> advanced(const BodyFilter* known,
+                                   const std::string& body,
+                                   const BodyEvidence& seen,
+                                   Stamp captured_at,
+                                   const MotionModel& model) {
+  if (!known) {
+    const std::vector<PoseFit> fits = seen.minima({}, Minima::all);
+    if (fits.empty()) return std::nullopt;
+    return started(body, seen, fits, captured_at);
+  }
+  if (captured_at <= known->looked_at) return *known;
+  BodyFilter last = *known;
+  last.gaps_s = {known->gaps_s[1], seconds_between(known->looked_at, captured_at)};
+  BodyFilter after = seen_again(last, seen, captured_at, model);
+  after.gaps_s = last.gaps_s;
+  return after;
+}
+
 std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
                                  std::span<const Body> bodies,
                                  std::span<const View> views,
@@ -272,18 +338,9 @@ std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
   for (const Body& body : bodies) {
     const auto before =
         std::find_if(known.begin(), known.end(), [&](const BodyFilter& m) { return m.body == body.name; });
-    const BodyCorrespondences seen = correspondences(body, views);
-    if (before == known.end()) {
-      const std::vector<PoseFit> fits = minima(seen);
-      if (!fits.empty()) motions.push_back(started(body, seen, fits, captured_at));
-    } else if (captured_at <= before->looked_at) {
-      motions.push_back(*before);
-    } else {
-      BodyFilter last = *before;
-      last.gaps_s = {before->gaps_s[1], seconds_between(before->looked_at, captured_at)};
-      motions.push_back(seen_again(last, body, seen, captured_at, model));
-      motions.back().gaps_s = last.gaps_s;
-    }
+    const MarkerEvidence seen(correspondences(body, views));
+    auto after = advanced(before == known.end() ? nullptr : &*before, body.name, seen, captured_at, model);
+    if (after) motions.push_back(std::move(*after));
   }
   return motions;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -33,9 +34,9 @@ struct MotionModel {
 MotionNoise still_noise(const MotionModel& model);
 MotionNoise moving_noise(const MotionModel& model);
 
-/// One hypothesis of a body's pose, of the two that a lone flat marker leaves open. Whether the body moves is
-/// unknown too: both cases are filtered, with their probabilities (an interacting multiple model: Blom and
-/// Bar-Shalom, "The interacting multiple model algorithm", 1988).
+/// One hypothesis of a body's pose, of the two that a lone flat marker leaves open, or the up to four of
+/// three balls. Whether the body moves is unknown too: both cases are filtered, with their probabilities (an
+/// interacting multiple model: Blom and Bar-Shalom, "The interacting multiple model algorithm", 1988).
 struct Branch {
   Motion still;  ///< may only drift
   Motion moving;
@@ -53,12 +54,15 @@ struct Fix {
 /// The filter's state of one body, from all images up to a moment.
 struct BodyFilter {
   std::string body;
-  std::vector<Branch> branches;  ///< one or two, at the time measured_at; the first is the one to report
+  std::vector<Branch> branches;  ///< one to four, at the time measured_at; the first is the one to report
   std::vector<Fix> fixes;        ///< the newest one or two, oldest first, on the reported branch
   int marker_count = 0;
   double rms_px = 0;
-  int misfits = 0;    ///< images in a row that contradict the motion
-  int of_one = 0;     ///< images in a row with only one branch
+  int misfits = 0;  ///< images in a row that contradict the motion
+  int of_one = 0;   ///< images in a row with only one branch
+  /// Images that must still agree before the body is reported: three balls in one camera lie like others by
+  /// chance. 0 for markers.
+  int images_to_confirm = 0;
   Stamp measured_at;  ///< capture time of the newest image that showed the body
   Stamp looked_at;    ///< capture time of the newest image
   /// Seconds between the newest three images, the older interval first. 0: not known yet.
@@ -69,6 +73,30 @@ struct BodyFilter {
 /// interval between images where these come more rarely. The shorter of the last two intervals counts, so
 /// that a pause is not taken for a slow camera.
 double lost_after_s(const BodyFilter& motion, const MotionModel& model);
+
+/// What the images of one moment show of a body, by markers or by balls.
+class BodyEvidence {
+ public:
+  virtual ~BodyEvidence() = default;
+  /// The points that the body's pose is computed from, as chosen for this pose.
+  virtual ChosenCorners points_at(const Pose& world_from_body) const = 0;
+  /// Squared normalised residuals of what else tells poses apart (the sizes of balls); 0 for markers.
+  virtual double further_cost(const Pose& world_from_body) const = 0;
+  /// The local minima of the points' error, likeliest first; none when the body is not seen. `predicted` and
+  /// `wanted` as in body_correspondences.h.
+  virtual std::vector<PoseFit> minima(std::span<const Pose> predicted, Minima wanted) const = 0;
+};
+
+/// The poses that a body's branches lead to at a moment, not before its newest image; none when it is lost
+/// then.
+std::vector<Pose> expected_poses(const BodyFilter& known, Stamp at, const MotionModel& model = {});
+
+/// The filter's step for one body; `known` is null before the body was seen. See observed().
+std::optional<BodyFilter> advanced(const BodyFilter* known,
+                                   const std::string& body,
+                                   const BodyEvidence& seen,
+                                   Stamp captured_at,
+                                   const MotionModel& model = {});
 
 /// The filter's step: `known` (the result of the step before, empty at first), updated by the images of one
 /// moment from all cameras that took one. The measurements are the corners themselves with their covariance,

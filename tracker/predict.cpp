@@ -57,6 +57,7 @@ std::vector<Track> predicted(std::span<const BodyFilter> known,
                              std::optional<Stamp> decided_at) {
   std::vector<Track> tracks;
   for (const BodyFilter& motion : known) {
+    if (motion.images_to_confirm > 0) continue;
     const double unseen = std::max(0.0, seconds_between(motion.measured_at, at));
     const Stamp decided = decided_at.value_or(at);
     const bool lost = seconds_between(motion.measured_at, decided) > lost_after_s(motion, model);

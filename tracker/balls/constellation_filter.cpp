@@ -1,0 +1,113 @@
+#include "tracker/balls/constellation_filter.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace limn::tracker {
+namespace {
+
+// Three balls in one camera are reported when this many images agree: those of two bodies that move do not
+// stay as far apart.
+constexpr int k_images_to_confirm = 10;
+// How far a body may be from where its motion leads to: a part for the prediction's error, and one for what a
+// hand does while the body is not seen.
+constexpr double k_spread_m = 0.01, k_spread_m_per_s = 0.6, k_spread_turn = 0.05, k_spread_turn_per_s = 3;
+
+ExpectedPoses expected_of(const BodyFilter* known, Stamp at, const MotionModel& model) {
+  if (!known) return {};
+  const double unseen = std::max(0.0, seconds_between(known->measured_at, at));
+  return {expected_poses(*known, at, model), k_spread_m + k_spread_m_per_s * unseen,
+          k_spread_turn + k_spread_turn_per_s * unseen};
+}
+
+// After a step: a body that has just been found among three balls, or again after a while, must be confirmed;
+// each image that agrees does.
+int images_to_confirm(const BodyFilter* before,
+                      const BodyFilter& after,
+                      const ExpectedPoses& expected,
+                      std::span<const ConstellationFit> fits) {
+  if (before && after.measured_at == before->measured_at) return before->images_to_confirm;
+  if (!is_weak(fits.front())) return 0;
+  const bool is_new = !before || after.fixes.size() == 1 || !is_firm(expected);
+  return is_new ? k_images_to_confirm : std::max(0, before->images_to_confirm - 1);
+}
+
+// The explanations of one constellation as evidence for its pose. A minimum's chi-square includes the sizes
+// of the balls, because only they tell the poses of three balls apart.
+class BallEvidence : public BodyEvidence {
+ public:
+  BallEvidence(const Constellation& constellation,
+               std::span<const BallView> views,
+               std::span<const ConstellationFit> fits)
+      : constellation_(constellation), views_(views), fits_(fits) {}
+
+  ChosenCorners points_at(const Pose& world_from_body) const override {
+    return chosen_at(world_from_body).points;
+  }
+
+  double further_cost(const Pose& world_from_body) const override {
+    const ConstellationFit* fit = chosen_at(world_from_body).fit;
+    return fit ? size_cost(fit->matches, constellation_, views_, world_from_body) : 0;
+  }
+
+  std::vector<PoseFit> minima(std::span<const Pose>, Minima) const override {
+    std::vector<PoseFit> minima;
+    for (const ConstellationFit& fit : fits_) {
+      minima.push_back(fit.fit);
+      minima.back().chi_square += fit.size_cost;
+    }
+    std::ranges::stable_sort(minima, {}, &PoseFit::chi_square);
+    return minima;
+  }
+
+ private:
+  struct Chosen {
+    const ConstellationFit* fit = nullptr;
+    ChosenCorners points;
+  };
+  // The explanation that agrees best with a pose.
+  Chosen chosen_at(const Pose& world_from_body) const {
+    Chosen best;
+    double least = std::numeric_limits<double>::infinity();
+    for (const ConstellationFit& fit : fits_) {
+      std::vector<PointObservation> observations = observations_of(fit, constellation_, views_);
+      const double value = cost(observations, world_from_body, k_huber);
+      if (best.fit && !(value < least)) continue;
+      best = {&fit, {std::move(observations), static_cast<int>(fit.matches.size())}};
+      least = value;
+    }
+    return best;
+  }
+
+  const Constellation& constellation_;
+  std::span<const BallView> views_;
+  std::span<const ConstellationFit> fits_;
+};
+
+}  // namespace
+
+std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
+                                 std::span<const Constellation> constellations,
+                                 std::span<const BallView> views,
+                                 Stamp captured_at,
+                                 const MotionModel& model) {
+  std::vector<const BodyFilter*> before;
+  std::vector<ExpectedPoses> expected;
+  for (const Constellation& constellation : constellations) {
+    const auto at = std::ranges::find(known, constellation.name, &BodyFilter::body);
+    before.push_back(at == known.end() ? nullptr : &*at);
+    expected.push_back(expected_of(before.back(), captured_at, model));
+  }
+  const std::vector<std::vector<ConstellationFit>> fits = identified(constellations, views, expected);
+  std::vector<BodyFilter> motions;
+  for (std::size_t i = 0; i < constellations.size(); ++i) {
+    const BallEvidence seen(constellations[i], views, fits[i]);
+    auto after = advanced(before[i], constellations[i].name, seen, captured_at, model);
+    if (!after) continue;
+    after->images_to_confirm = images_to_confirm(before[i], *after, expected[i], fits[i]);
+    motions.push_back(std::move(*after));
+  }
+  return motions;
+}
+
+}  // namespace limn::tracker
