@@ -230,10 +230,9 @@ void add_detect(CLI::App& app, Run& run) {
              "How poses are computed: ippe, or triangle (the method of the 2011 paper)");
   add_choice(command, "--encoding", &options->encoding, tracker::k_encodings,
              "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)");
-  auto* csv = command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
+  command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
   command->add_option("--json", options->json, "JSON file to write: corners, poses, covariances");
-  auto* draw = command->add_option("--draw", options->draw,
-                                   "Folder for copies of the images with the markers drawn in");
+  command->add_option("--draw", options->draw, "Folder for copies of the images with the markers drawn in");
   command
       ->add_option("--threads", options->threads,
                    "Number of images to process at the same time; with one image or --repeat, number of "
@@ -250,9 +249,9 @@ void add_detect(CLI::App& app, Run& run) {
           ->add_option("--constellation", balls->constellations,
                        "Find these constellations of balls instead of markers (files of limn markers "
                        "--learn-constellation), separated by commas")
-          ->delimiter(',')
-          ->excludes(csv)
-          ->excludes(draw);
+          ->delimiter(',');
+  for (const char* other : {"--family", "--size-mm", "--pose", "--csv", "--draw", "--threads", "--repeat"})
+    constellation->excludes(command->get_option(other));
   add_choice(command, "--shade", &balls->shade, tracker::k_ball_shades,
              "With --constellation: whether the balls are brighter or darker than what is around them")
       ->needs(constellation);

@@ -171,6 +171,43 @@ TEST(BallFinder, FindsEachOfManyInOneImageOnce) {
   }
 }
 
+// A retroreflective sphere that is three times too bright: its image grows alike on all sides.
+TEST(BallFinder, AnOverexposedSphereKeepsItsCentre) {
+  auto rng = test::test_rng();
+  const Lens lens = wide_lens();
+  BallFinder finder;
+  Errors errors;
+  for (int i = 0; i < 20; ++i) {
+    PlacedBall ball = ball_at(lens, {uniform(rng, 200, 1000), uniform(rng, 200, 700)}, 20, BallSurface::flat);
+    ball.light = 750;
+    const cv::Mat image = test::image_of(lens, test::plain(1280, 960, 20), std::vector{ball},
+                                         {.blur_px = 0.8, .noise_levels = 2}, rng);
+    add(lens, ball, finder.find(image, lens), &errors);
+  }
+  ASSERT_EQ(errors.found, 20);
+  EXPECT_EQ(errors.more, 0);
+  EXPECT_LT(errors.rms(), 0.05);
+}
+
+// Edges of the background beside the outline pull at it; the covariance says so.
+TEST(BallFinder, FindsSpheresBeforeClutter) {
+  auto rng = test::test_rng();
+  const Lens lens = wide_lens();
+  BallFinder finder;
+  Errors errors;
+  for (int i = 0; i < 40; ++i) {
+    PlacedBall ball = ball_at(lens, {uniform(rng, 200, 1000), uniform(rng, 200, 700)}, 30, BallSurface::matt);
+    cv::Mat background = test::clutter(1280, 960, rng);
+    background.convertTo(background, CV_8U, 0.4);
+    const cv::Mat image =
+        test::image_of(lens, background, std::vector{ball}, {.blur_px = 0.6, .noise_levels = 2}, rng);
+    add(lens, ball, finder.find(image, lens), &errors);
+  }
+  EXPECT_GE(errors.found, 26);  // the others are refused
+  EXPECT_LT(errors.rms(), 0.15);
+  EXPECT_LT(errors.deviation_share(), 1.5);
+}
+
 // Ellipses that are no sphere's outline there, squares, hexagons, a sphere behind a bar, one that leaves the
 // image.
 TEST(BallFinder, RefusesWhatIsNoWholeSphere) {

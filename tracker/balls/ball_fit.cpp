@@ -30,17 +30,19 @@ constexpr double k_least_blur_px = 0.25, k_most_blur_px = 8;  // that of a pixel
 // How far pixels on both sides of the outline are used: in its blur, and beyond it.
 constexpr double k_reach_blurs = 2.5, k_reach_px = 1.2;
 constexpr double k_most_inside_share = 0.7;  // share of the radius: what lies deeper may be printed or shiny
-constexpr std::size_t k_most_pixels = 900;   // only a part of a large sphere's is used
+constexpr std::size_t k_most_pixels = 600;   // only a part of a large sphere's is used
 constexpr std::size_t k_least_pixels = 40;
 constexpr int k_max_steps = 15;
-constexpr double k_settled_px = 1e-3;
-constexpr double k_huber = 2;  // in robust standard deviations
-constexpr int k_rounds = 3;    // the blur of each round sets the reach of the next
+constexpr double k_settled_px = 1e-3, k_roughly_settled_px = 0.02;  // rough: before the last round
+constexpr double k_huber = 2;                                       // in robust standard deviations
+constexpr int k_rounds = 3;                // the blur of each round sets the reach of the next
+constexpr double k_same_blur_share = 0.1;  // a blur that changes by less needs no further round
 constexpr int k_sectors = 16;
+constexpr double k_alike_by_chance = 2;  // variance of the sectors' sums over that of independent residuals
 // The outline may deviate from a cone by this much (RMS over its sectors, beyond noise), as share of its
 // radius.
 constexpr double k_most_bumps_px = 0.06, k_most_bumps_share = 0.008;
-constexpr double k_most_residual_share = 0.12;  // RMS residual over the contrast, beyond noise of 3 levels
+constexpr double k_most_residual_share = 0.08;  // RMS residual over the contrast, beyond noise of 3 levels
 constexpr double k_noise_levels = 3;
 constexpr double k_least_sector_share = 0.15;  // contrast of the weaker sectors, as share of the mean
 constexpr int k_most_weak_sectors = 3;
@@ -228,6 +230,7 @@ struct BallFitter::Problem {
   const std::vector<Pixel>& pixels;
   HuberLoss loss;
   double scale = 1;  // standard deviation of a pixel
+  double settled_px = k_settled_px;
   State state;
   State trial{};
   Row step = Row::Zero();
@@ -273,7 +276,7 @@ struct BallFitter::Problem {
   }
   void accept_trial() { state = trial; }
   bool is_settled(const LeastSquaresTrial& tried) const {
-    return tried.is_accepted && step.head<3>().lpNorm<Eigen::Infinity>() < k_settled_px;
+    return tried.is_accepted && step.head<3>().lpNorm<Eigen::Infinity>() < settled_px;
   }
   // Solves for the light alone, at the state's shape.
   bool fit_light() {
@@ -348,6 +351,7 @@ template <class Pixels, class State>
 Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& loss, double scale) {
   struct Sector {
     double moment = 0, weight = 0, inside = 0, outside = 0, of_inside = 0, of_outside = 0;
+    std::array<double, 2> residuals{}, count{};  // sums over the pixels inside and outside
   };
   std::array<Sector, k_sectors> sectors{};
   double squares = 0;
@@ -356,6 +360,8 @@ Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& 
     const double r = pixel.light - model.value, w = loss.weight(r * r / (scale * scale));
     squares += w * r * r;
     Sector& sector = sectors[static_cast<std::size_t>(model.sector)];
+    const std::size_t side = model.inside_px > 0 ? 0 : 1;
+    sector.residuals[side] += w * r, sector.count[side] += w * w;
     sector.moment += w * r * model.by_edge;
     sector.weight += w * model.by_edge * model.by_edge;
     if (model.inside_px > state.blur_px) sector.inside += pixel.light, sector.of_inside += 1;
@@ -380,6 +386,15 @@ Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& 
       ++evidence.weak_sectors;
   if (used > 0) evidence.bumps_px = std::sqrt(std::max(0.0, (shifts - noise) / used));
   if (used > 0) evidence.agreement = std::max(1.0, normalised / used);
+  // Where clutter lies beside the outline, neighbouring residuals are alike and do not average out.
+  double sums = 0, cells = 0;
+  for (const Sector& sector : sectors)
+    for (std::size_t side = 0; side < 2; ++side)
+      if (sector.count[side] > 1)
+        sums += sector.residuals[side] * sector.residuals[side] / (sector.count[side] * scale * scale),
+            ++cells;
+  const double alike = sums / std::max(1.0, cells - k_light_terms);
+  if (alike > k_alike_by_chance) evidence.agreement = std::max(evidence.agreement, alike);
   return evidence;
 }
 
@@ -410,14 +425,18 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
     if (round > 0) {
       problem.scale = problem.robust_deviation();
       problem.loss = loss;
+    } else {
+      problem.settled_px = k_roughly_settled_px;
     }
     const LeastSquaresSummary found = minimise(&problem, {.max_steps = k_max_steps, .first_damping = 1e-3});
     if (found.end == LeastSquaresEnd::no_start || !problem.linearise()) return std::nullopt;
+    const double blur_before = state.blur_px;
     state = problem.state;
     scale = problem.scale;
     information = problem.normal;
     if ((state.centre_px - start.centre_px).norm() > 1 + k_most_shift_share * start.radius_px)
       return std::nullopt;
+    if (round > 0 && std::abs(state.blur_px - blur_before) < k_same_blur_share * state.blur_px) break;
   }
   const Evidence evidence = evidence_of(pixels_, state, loss, scale);
   if (!shows_sphere(evidence, state.radius_px, min_contrast)) return std::nullopt;
