@@ -376,12 +376,21 @@ Status read_bits(int first, const Code& code, const cv::Mat& both, Series* serie
   return {};
 }
 
-Result<PhaseReading> read_steps(int first, Series* series) {
+// The steps of one axis; `shake`: what each step and its inverse, half a wave later, differ from white and
+// black by.
+Result<PhaseReading> read_steps(int first, Series* series, std::vector<PairShake>* shake) {
+  const int steps = series->patterns.steps(), half = steps / 2;
+  std::vector<cv::Mat> first_half;  // until their inverses are read
   PhaseReading reading(series->size.height, series->size.width, series->patterns.options.period_px,
                        series->patterns.steps());
   for (int k = 0; k < series->patterns.steps(); ++k) {
     LIMN_TRY(const cv::Mat image, series->read(first + k));
     reading.add_step(k, image);
+    if (!series->shake || steps % 2 != 0) continue;
+    if (k < half)
+      first_half.push_back(image);
+    else
+      shake->push_back(series->shake->measure(first_half[static_cast<size_t>(k - half)], image));
   }
   return reading;
 }
@@ -481,6 +490,17 @@ void settle_shake(const std::vector<AxisLabels>& labels, Shake* shake, std::arra
   }
 }
 
+// What a shake has done to the steps of an axis, as settle_shake() says it of its bits.
+std::vector<PairShake> settled(std::vector<PairShake> pairs, const Shake& shake) {
+  if (!shake.shakes && !shake.flickers) return {};
+  for (PairShake& pair : pairs) {
+    pair.shift_px += shake.white_shift_px;
+    pair.shift_px *= shake.shakes ? shake.share : 0;
+    if (!shake.flickers || !std::isfinite(pair.gain_stddev)) pair.gain_difference = 0;
+  }
+  return pairs;
+}
+
 // Converts blocks of projector pixels to pixels.
 void to_pixels(double block, AxisLabels* labels) {
   if (block == 1) return;
@@ -574,8 +594,10 @@ Result<Decoded> decode(const Patterns& patterns,
   LIMN_TRY_STATUS(read_bits(0, codes[0], both, &series, &axes[0]));
   LIMN_TRY_STATUS(read_bits(patterns.first_row_bit(), codes[1], both, &series, &axes[1]));
   std::vector<PhaseReading> waves;
+  std::array<std::vector<PairShake>, 2> of_steps;
   for (int axis = 0; axis < 2 && patterns.steps() > 0; ++axis) {
-    LIMN_TRY(PhaseReading reading, read_steps(patterns.first_step() + axis * patterns.steps(), &series));
+    LIMN_TRY(PhaseReading reading, read_steps(patterns.first_step() + axis * patterns.steps(), &series,
+                                              &of_steps[static_cast<size_t>(axis)]));
     waves.push_back(std::move(reading));
   }
   Decoded decoded;
@@ -596,7 +618,9 @@ Result<Decoded> decode(const Patterns& patterns,
   for (size_t axis = 0; axis < 2; ++axis) {
     if (axes[axis].bits() > 0) refine_between_edges(axes[axis], noise, options.floor_px, &labels[axis]);
     to_pixels(block, &labels[axis]);
-    if (!waves.empty()) refine_by_phase(waves[axis], noise, options.floor_px, &labels[axis]);
+    if (waves.empty()) continue;
+    const std::vector<PairShake> shake = settled(std::move(of_steps[axis]), decoded.quality.shake);
+    refine_by_phase(waves[axis], noise, options.floor_px, shake, &labels[axis]);
   }
   decoded.decoded = join(labels[0], labels[1], &decoded);
   const int contradicted = count_unlabelled(doubted, decoded.px_projector);

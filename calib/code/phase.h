@@ -1,7 +1,9 @@
 #pragma once
 
 #include <opencv2/core/mat.hpp>
+#include <vector>
 
+#include "calib/code/shake.h"
 #include "calib/code/subpixel.h"
 
 namespace limn::calib {
@@ -27,11 +29,13 @@ class PhaseReading {
 /// Replaces the labels' coordinates by the phase's. The wave is the one whose coordinate is nearest to the
 /// label, so that a label may be wrong by almost half a wave. The label and its variance stay where the noise
 /// alone changes the phase by more than a tenth of a wave, and where label and phase are so far apart that
-/// the next wave is about as near: the pixel is kept without the fine part. Variance: the phase's by the
-/// noise of the intensities, 2 var / (steps * amplitude^2) * (period / 2 pi)^2, plus floor_px^2.
+/// the next wave is about as near: the pixel is kept without the fine part. What `shake` has done to the
+/// phase is taken out, to first order. Variance: the phase's by the noise of the intensities, 2 var / (steps
+/// * amplitude^2) * (period / 2 pi)^2, plus floor_px^2.
 void refine_by_phase(const PhaseReading& reading,
                      const DifferenceNoise& noise,
                      double floor_px,
+                     const std::vector<PairShake>& shake,
                      AxisLabels* labels);
 
 }  // namespace limn::calib

@@ -120,6 +120,47 @@ TEST(Shake, OfTheCameraIsTakenOutOfTheLabels) {
   EXPECT_LT(std::sqrt(with / 8), 0.008);
 }
 
+// The steps of a wave are displaced and differ in their light, too: without a correction the labels are off
+// by 0.04 px RMS more than those of a still series.
+TEST(Shake, OfTheCameraIsTakenOutOfPhases) {
+  const Patterns patterns = Patterns::create(PatternCode::phase, 64, 64, {.gamma = 1}).value();
+  const auto is_beside_ink = [](double at) { return std::abs(std::sin(at * M_PI / 12)) < 0.8; };
+  const auto error_px = [&](const Disturbed& disturbed) {
+    CodeBench bench = bench_of(disturbed, true);
+    bench.patterns = patterns;
+    const Decoded decoded = decoded_of(bench);
+    // Labels are those of the mean of white and the images of bits.
+    Vector2d mean = disturbed.shifts[static_cast<size_t>(patterns.white())];
+    for (int i = 0; i < patterns.first_step(); ++i) mean += disturbed.shifts[static_cast<size_t>(i)];
+    mean /= patterns.first_step() + 1;
+    double sum = 0;
+    int count = 0;
+    for (int y = 8; y + 8 < bench.height; ++y) {
+      for (int x = 8; x + 8 < bench.width; ++x) {
+        const auto& label = decoded.px_projector.at<cv::Vec2f>(y, x);
+        if (std::isnan(label[0]) || is_beside_ink(x + 3.3) || is_beside_ink(y + 1.7)) continue;
+        sum += (Vector2d(label[0], label[1]) -
+                Vector2d(bench.column_at(x - mean.x()), bench.row_at(y - mean.y())))
+                   .squaredNorm();
+        ++count;
+      }
+    }
+
+    EXPECT_GT(count, 1500);
+    return std::sqrt(sum / (2 * count));
+  };
+  const double still = error_px(Disturbed(patterns.count(), 0, 0, test::test_rng()));
+  double shaken = 0;
+  for (int draw = 0; draw < 3; ++draw) {
+    std::mt19937_64 rng = test::test_rng();
+    rng.discard(static_cast<unsigned>(1000 * draw));
+    shaken += std::pow(error_px(Disturbed(patterns.count(), 0.2, 0.015, rng)), 2) / 3;
+  }
+  shaken = std::sqrt(shaken);
+  printf("[ shake    ] error of phase labels %.4f px, of a still series %.4f px\n", shaken, still);
+  EXPECT_LT(std::sqrt(shaken * shaken - still * still), 0.02);
+}
+
 TEST(Shake, OfTheBoardLeavesTheLabelsAndMovesTheCorners) {
   const Disturbed disturbed(26, 0.2, 0, test::test_rng());
   const CodeBench bench = bench_of(disturbed, false);
