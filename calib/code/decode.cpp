@@ -376,8 +376,8 @@ Status read_bits(int first, const Code& code, const cv::Mat& both, Series* serie
   return {};
 }
 
-// The steps of one axis; `shake`: what each step and its inverse, half a wave later, differ from white and
-// black by.
+// The steps of one axis. `shake`: by what each step and its inverse, half a wave later, differ from white and
+// black.
 Result<PhaseReading> read_steps(int first, Series* series, std::vector<PairShake>* shake) {
   const int steps = series->patterns.steps(), half = steps / 2;
   std::vector<cv::Mat> first_half;  // until their inverses are read

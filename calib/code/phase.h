@@ -29,8 +29,10 @@ class PhaseReading {
 /// Replaces the labels' coordinates by the phase's. The wave is the one whose coordinate is nearest to the
 /// label, so that a label may be wrong by almost half a wave. The label and its variance stay where the noise
 /// alone changes the phase by more than a tenth of a wave, and where label and phase are so far apart that
-/// the next wave is about as near: the pixel is kept without the fine part. What `shake` has done to the
-/// phase is taken out, to first order. Variance: the phase's by the noise of the intensities, 2 var / (steps
+/// the next wave is about as near: the pixel is kept without the fine part. `shake`: by what the steps of the
+/// first half, each with the one half a wave later (its inverse), differ from the mean image of the series;
+/// its effect on the phase is taken out to first order; empty: none. Variance: the phase's by the noise of
+/// the intensities, 2 var / (steps
 /// * amplitude^2) * (period / 2 pi)^2, plus floor_px^2.
 void refine_by_phase(const PhaseReading& reading,
                      const DifferenceNoise& noise,
