@@ -32,8 +32,7 @@ class PhaseReading {
 /// the next wave is about as near: the pixel is kept without the fine part. `shake`: by what the steps of the
 /// first half, each with the one half a wave later (its inverse), differ from the mean image of the series;
 /// its effect on the phase is taken out to first order; empty: none. Variance: the phase's by the noise of
-/// the intensities, 2 var / (steps
-/// * amplitude^2) * (period / 2 pi)^2, plus floor_px^2.
+/// the intensities, 2 var / (steps * amplitude^2) * (period / 2 pi)^2, plus floor_px^2.
 void refine_by_phase(const PhaseReading& reading,
                      const DifferenceNoise& noise,
                      double floor_px,
