@@ -111,6 +111,11 @@ struct BoardAndProjector {
     return made;
   }
 
+  calib::CaptureSet plan(const fs::path& folder) const {
+    return calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
+                                {{projector.name, projector.width, projector.height}}, board);
+  }
+
   void capture_seen(const calib::CaptureSet& plan, int pose, const std::vector<Sample>& seen) const {
     cv::Mat photo;
     const Status status = calib::capture_pose(
@@ -125,9 +130,7 @@ struct BoardAndProjector {
   }
 
   void capture(const fs::path& folder, int poses, bool with_board = true) const {
-    const calib::CaptureSet plan =
-        calib::plan_captures(folder, {{camera.name, camera.width, camera.height}},
-                             {{projector.name, projector.width, projector.height}}, board);
+    const calib::CaptureSet plan = this->plan(folder);
     ASSERT_TRUE(calib::begin_captures(plan).ok());
     for (int pose = 0; pose < poses; ++pose) capture_seen(plan, pose, samples(pose, with_board));
   }
@@ -384,9 +387,7 @@ TEST(SolveCommand, NamesCopiedImagesAndTheBoardThatWasReallyThere) {
 TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig with bar";
   const BoardAndProjector truth;
-  const calib::CaptureSet plan = calib::plan_captures(
-      captures, {{truth.camera.name, truth.camera.width, truth.camera.height}},
-      {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
+  const calib::CaptureSet plan = truth.plan(captures);
   for (const int pose : {6, 7}) truth.capture_bar(plan, pose);
   wizard::SolveCommandOptions options{.captures = captures, .out = out};
   options.scale_bar_lengths = {"apriltag_36h11:3 apriltag_36h11:7 250mm", "apriltag_36h11:3 64mm"};
@@ -436,6 +437,14 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
     EXPECT_FALSE(calib::parse_scale_bar(nonsense).ok()) << nonsense;
 }
 
+// Gives the board, charuco:8x6:40mm, another text.
+void describe_board(const fs::path& captures, const std::string& text) {
+  const std::string true_text = "charuco:8x6:40mm";
+  std::string described = read_file(captures / "capture.json").value();
+  described.replace(described.find(true_text), true_text.size(), text);
+  ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
+}
+
 // A rig's size: the distance between its camera and its projector.
 double baseline_m(const Rig& rig) {
   return (rig.cameras[0].imager_from_world.inverse().translation -
@@ -448,18 +457,14 @@ double baseline_m(const Rig& rig) {
 TEST(SolveCommand, AKnownLengthGivesTheRigItsSizeWhereThePrintIsALittleTooLarge) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig of bar";
   const BoardAndProjector truth;
-  const calib::CaptureSet plan = calib::plan_captures(
-      captures, {{truth.camera.name, truth.camera.width, truth.camera.height}},
-      {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
+  const calib::CaptureSet plan = truth.plan(captures);
   for (const int pose : {6, 7, 8}) truth.capture_bar(plan, pose);
   wizard::SolveCommandOptions options{.captures = captures, .out = out};
   const auto exact = wizard::solve_captures(options);
   ASSERT_TRUE(exact.ok()) << exact.message();
   const double true_m = baseline_m(exact->solution.rig);
 
-  std::string described = read_file(captures / "capture.json").value();
-  described.replace(described.find("charuco:8x6:40mm"), 16, "charuco:8x6:39.85mm");
-  ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
+  describe_board(captures, "charuco:8x6:39.85mm");
   const auto blind = wizard::solve_captures(options);
   ASSERT_TRUE(blind.ok()) << blind.message();
   EXPECT_NEAR(baseline_m(blind->solution.rig) / true_m, 39.85 / 40, 2e-4);
@@ -483,17 +488,13 @@ TEST(SolveCommand, AKnownLengthGivesTheRigItsSizeWhereThePrintIsALittleTooLarge)
 TEST(SolveCommand, ASecondBoardGivesTheRigItsSize) {
   const fs::path captures = own_captures(), out = captures.parent_path() / "rig of two boards";
   const BoardAndProjector truth;
-  const calib::CaptureSet plan = calib::plan_captures(
-      captures, {{truth.camera.name, truth.camera.width, truth.camera.height}},
-      {{truth.projector.name, truth.projector.width, truth.projector.height}}, truth.board);
+  const calib::CaptureSet plan = truth.plan(captures);
   wizard::SolveCommandOptions options{.captures = captures, .out = out};
   const auto exact = wizard::solve_captures(options);
   ASSERT_TRUE(exact.ok()) << exact.message();
   const auto second = calib::draw_board(calib::Board::parse("chessboard:6x5:35mm").value());
   for (const int pose : {6, 7, 8}) truth.capture_seen(plan, pose, truth.samples(pose, true, second));
-  std::string described = read_file(captures / "capture.json").value();
-  described.replace(described.find("charuco:8x6:40mm"), 16, "charuco:8x6:39.85mm");
-  ASSERT_TRUE(write_file(captures / "capture.json", described).ok());
+  describe_board(captures, "charuco:8x6:39.85mm");
 
   options.scale_bar_lengths = {"chessboard:6x5:35mm:exact"};
   const auto right = wizard::solve_captures(options);

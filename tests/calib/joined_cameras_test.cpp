@@ -45,32 +45,31 @@ void expect_truth(const Rig& found, const Rig& truth, double px) {
   }
 }
 
+// Solves with noise, and compares with the truth.
+void expect_joined(World* world) {
+  add_noise(world, 0.02, 0.03, test_rng());
+  const auto solution = solve(world->observations);
+  ASSERT_TRUE(solution.ok()) << solution.message();
+  expect_truth(solution->rig, world->rig, 0.6);
+}
+
 TEST(JoinedCameras, OneProjectorJoinsCamerasWithoutACommonBoard) {
   World world = apart_world(1, 14);
-  add_noise(&world, 0.02, 0.03, test_rng());
-  const auto solution = solve(world.observations);
-  ASSERT_TRUE(solution.ok()) << solution.message();
-  expect_truth(solution->rig, world.rig, 0.6);
+  expect_joined(&world);
 }
 
 TEST(JoinedCameras, AProjectorJoinsThatOneCameraHardlySees) {
   World world = apart_world(1, 14);
   std::erase_if(world.observations.matches,
                 [](const Match& match) { return match.camera == 0 && match.pose > 0; });
-  add_noise(&world, 0.02, 0.03, test_rng());
-  const auto solution = solve(world.observations);
-  ASSERT_TRUE(solution.ok()) << solution.message();
-  expect_truth(solution->rig, world.rig, 0.6);
+  expect_joined(&world);
 }
 
 TEST(JoinedCameras, ASceneJoinsCamerasThatShareNoLightOnBoards) {
   World world = apart_world(2, 14);
   keep_own_light(&world);
   observe_scene(&world, 12, 9);
-  add_noise(&world, 0.02, 0.03, test_rng());
-  const auto solution = solve(world.observations);
-  ASSERT_TRUE(solution.ok()) << solution.message();
-  expect_truth(solution->rig, world.rig, 0.6);
+  expect_joined(&world);
 }
 
 TEST(JoinedCameras, CamerasThatNothingJoinsAreNamed) {
