@@ -287,7 +287,8 @@ void conclude(double widened, ScaleBarCheck* check) {
 
 // Reads "250mm" or "250mm:0.05".
 bool parse_length(const std::string& text, ScaleBar* known) {
-  static const std::regex k_form(R"((\d+(?:\.\d+)?)(mm|cm|m)(?::(\d+(?:\.\d+)?)(?:mm)?)?)");
+  static const std::regex k_form(
+      R"(((?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(mm|cm|m)(?::(\d+\.?\d*|\.\d+)(?:mm)?)?)");
   std::smatch parts;
   if (text.size() > 40 || !std::regex_match(text, parts, k_form)) return false;
   const auto number = [&](size_t i) { return std::strtod(parts[i].str().c_str(), nullptr); };
@@ -327,8 +328,7 @@ std::string what_is_believed(const Board& board, const std::optional<BoardMeasur
   if (board.is_exact) return "The rig keeps the board's size, because its text says that it is exact.";
   if (measured) return "The rig keeps the board's size, because it was measured, too.";
   return "The rig keeps the board's size: prints are wrong by some thousandths at most, so one of both "
-         "numbers "
-         "is a mistake, and images do not show which.";
+         "numbers is a mistake, and images do not show which.";
 }
 
 }  // namespace
@@ -448,7 +448,7 @@ std::optional<Fault> growth_note(const PrintGrowth& found, const Board& board) {
   if (std::abs(found.mean) <= std::max(k_scale_tolerance, 3 * found.stddev)) return std::nullopt;
   return Fault{
       FaultName::wrong_scale,
-      fmt::format("the board is {:+.2f} % larger than its text says, by the known lengths (standard "
+      fmt::format("the known lengths show the board's size to differ from its text by {:+.2f} % (standard "
                   "deviation {:.2f} %). They are believed and part of the solve, because prints are "
                   "often wrong by so much, measured lengths are not",
                   100 * found.mean, 100 * found.stddev),

@@ -431,6 +431,11 @@ TEST(SolveCommand, AKnownLengthTellsABoardOfTheWrongSize) {
   const auto unseen = wizard::solve_captures(options);
   ASSERT_TRUE(unseen.ok()) << unseen.message();
   EXPECT_EQ(unseen->assessment.faults.back().name, calib::FaultName::scale_bar_not_seen);
+  for (const char* length : {"250mm", "25cm", ".25m", "2.5e2mm", "250mm:0.05", "250.mm:.05mm"}) {
+    const auto read = calib::parse_scale_bar(std::string("a:1 b:2 ") + length);
+    ASSERT_TRUE(read.ok()) << read.message();
+    EXPECT_NEAR(read->length_m, 0.25, 1e-12);
+  }
   for (const char* nonsense :
        {"", "apriltag_36h11:3", "250mm", "a:1 b:2 250", "a:1 a:1 250mm", "a:1 b:2 -3mm", "a:1 b:2 30mm:0",
         "charuco:6x5", "charuco:6x5:30mm 40mm", "charuco:6x5:30mm 120x90mm x", "acircles:4x11:20mm"})
