@@ -139,7 +139,7 @@ struct BoardAndProjector {
 // The captures of six poses, made once for all tests of this file.
 const fs::path& captured() {
   static const fs::path folder = [] {
-    const fs::path made = test_folder() / "captures";
+    fs::path made = test_folder() / "captures";
     BoardAndProjector().capture(made, 6);
     return made;
   }();
@@ -148,15 +148,16 @@ const fs::path& captured() {
 
 // A copy of the captures that a test may damage.
 fs::path own_captures() {
-  const fs::path original = captured();
-  const fs::path copy = original.parent_path() / "damaged";
+  const fs::path& original = captured();
+  fs::path copy = original.parent_path() / "damaged";
   fs::remove_all(copy);
   fs::copy(original, copy, fs::copy_options::recursive);
   return copy;
 }
 
 TEST(SolveCommand, FindsTheRigThatTookTheCaptures) {
-  const fs::path captures = captured(), out = captures.parent_path() / "rig";
+  const fs::path& captures = captured();
+  const fs::path out = captures.parent_path() / "rig";
   const Status status = run_solve({.captures = captures, .out = out});
   ASSERT_TRUE(status.ok()) << status.message();
   const auto rig = load_rig(out);
@@ -246,7 +247,8 @@ class OnOneCore {
 };
 
 TEST(SolveCommand, GivesTheSameBytesForTheSameCapturesOnOneCoreAndOnMany) {
-  const fs::path captures = captured(), folder = captures.parent_path();
+  const fs::path& captures = captured();
+  const fs::path folder = captures.parent_path();
   ASSERT_TRUE(run_solve({.captures = captures, .out = folder / "first"}).ok());
   {
     const OnOneCore alone;
@@ -601,7 +603,8 @@ TEST(SolveCommand, ImportsOtherOrdersWithTheSameResult) {
 }
 
 TEST(SolveCommand, RefusesColumnsWithoutRows) {
-  const fs::path all = captured(), out = all.parent_path();
+  const fs::path& all = captured();
+  const fs::path out = all.parent_path();
   wizard::SolveCommandOptions options{.captures = out / "photos", .out = out / "rig"};
   options.foreign = {.import_format = wizard::ImportFormat::opencv_gray,
                      .projector = "256x192",
@@ -621,7 +624,8 @@ TEST(SolveCommand, RefusesColumnsWithoutRows) {
 // Few poses in the middle of the image determine the lens too little: the verdict is reject, and all is
 // written.
 TEST(SolveCommand, SolvesTheCamerasOfCapturesAlone) {
-  const fs::path captures = captured(), out = captures.parent_path();
+  const fs::path& captures = captured();
+  const fs::path out = captures.parent_path();
   const Status status = run_solve({.captures = captures, .out = out / "rig", .cameras_only = true});
   ASSERT_FALSE(status.ok());
   EXPECT_NE(status.message().find("rejected"), std::string::npos) << status.message();
