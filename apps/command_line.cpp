@@ -876,6 +876,9 @@ void add_live(CLI::App& app, Run& run) {
              "How poses are predicted for the moment when the light is shown: hold, linear or filtered");
   add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
              "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
+  command->add_option("--stereo", options->stereo,
+                      "Projector of the virtual rig that shows an image to each eye of the viewer; repeat it "
+                      "for several. For devices, stereo is set in the devices file");
   command->add_option("--osc", options->osc,
                       "PORT or ADDRESS:PORT at which OSC messages of other programs are received; a port "
                       "alone accepts this machine only");

@@ -54,6 +54,10 @@ void end_session_on_signals() {
 }
 
 Status check_options(const LiveOptions& options) {
+  if (!options.stereo.empty() && !options.devices.empty())
+    return usage_error(
+        "--stereo: expected it without --devices. For devices, set stereo at the display in the devices "
+        "file.");
   if (!(options.seconds >= 0) || options.seconds > 1e6)
     return usage_error("--seconds: expected a number of seconds, or 0 for no end, found {}.",
                        options.seconds);
@@ -150,6 +154,12 @@ Status set_up(const LiveOptions& options, session::SessionSetup* setup) {
   setup->paint.prediction = options.prediction;
   setup->paint.marker_light = options.marker_light;
   setup->paint.refill = options.refill;
+  for (const std::string& name : options.stereo) {
+    if (!find_named(setup->rig.projectors, name))
+      return usage_error("--stereo: expected a projector of the rig ({}), found '{}'.",
+                         joined_names(setup->rig.projectors), name);
+    setup->paint.stereo_projectors.push_back(name);
+  }
   setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
   setup->paint.motion = setup->watch.motion;
   return {};
@@ -276,6 +286,7 @@ session::SessionDevices opened(const device::Devices& devices,
       out.projectors[static_cast<std::size_t>(projector - rig.projectors.data())] = std::move(opened);
     else
       out.screens.push_back(std::move(opened));
+    if (wanted.wall) out.walls[wanted.name] = *wanted.wall;
   }
   for (const device::KeysConfig& wanted : devices.keys) {
     auto keys = device::KeySource::open(wanted);
@@ -292,7 +303,10 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));
   for (const device::DisplayConfig& display : devices.displays)
-    if (!is_projector(setup.rig, display.name)) setup.screens.push_back(display.name);
+    if (!is_projector(setup.rig, display.name))
+      setup.screens.push_back(display.name);
+    else if (display.stereo != StereoLayout::off)
+      setup.paint.stereo_projectors.push_back(display.name);
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera =
       !setup.rig.cameras.empty() && is_measured_linear(setup.rig, setup.rig.cameras.front());

@@ -237,21 +237,22 @@ class Comparison final : public session::FrameSink {
              std::optional<device::Window> window)
       : recording_(recording), session_(session), window_(std::move(window)) {}
 
-  Status show(const session::ComposedFrame& painted, const std::vector<cv::Mat>&) override {
+  Status show(const session::ComposedFrame& painted, const std::vector<EyeImages>&) override {
     ++images_;
     const double at_s = seconds_of(painted.shown_at);
     if (session::pose_log(painted) != recording_->painted().poses && ++other_poses_ == 1) first_pose_ = at_s;
-    const std::string print = fmt::format("{:016x}", session::fingerprint(painted.projectors));
+    const std::string print = fmt::format("{:016x}", session::fingerprint(painted.eye_images()));
     if (print != recording_->painted().images && ++other_images_ == 1) first_image_ = at_s;
     return {};
   }
 
-  std::set<scene::Screen> wanted_screens() const override {
-    return window_ ? std::set{session_->show_state().screen} : std::set<scene::Screen>();
+  std::vector<session::ScreenRequest> wanted_screens() const override {
+    if (!window_) return {};
+    return {{.what = session_->show_state().screen}};
   }
-  void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
-    for (const auto& [what, image] : images)
-      if (!image.empty()) window_->show(image);
+  void show_screens(std::span<const session::ScreenImages> screens) override {
+    for (const session::ScreenImages& screen : screens)
+      if (window_ && !screen.images.left.empty()) window_->show(screen.images.left);
     is_closed_ = window_ && !window_->is_open();
   }
   const std::atomic<bool>& is_closed() const { return is_closed_; }

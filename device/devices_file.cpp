@@ -43,8 +43,23 @@ device::CameraConfig read_camera(const ConfigNode& node, const std::filesystem::
   return camera;
 }
 
+Wall wall_of(const ConfigNode& node) {
+  const auto corners = node.items();
+  Wall wall;
+  if (corners.size() != 3) {
+    node.problem(fmt::format(
+        "expected the top left, top right and bottom left corner as [x, y, z] in mm, found {} corners.",
+        corners.size()));
+    return wall;
+  }
+  Eigen::Vector3d* const places[] = {&wall.top_left, &wall.top_right, &wall.bottom_left};
+  for (std::size_t i = 0; i < 3; ++i) *places[i] = 1e-3 * corners[i].vector3();
+  if (const Status is_wall = check_wall(wall); !is_wall) node.problem(is_wall.message());
+  return wall;
+}
+
 device::DisplayConfig read_display(const ConfigNode& node) {
-  node.only({"name", "monitor", "size", "latency_ms"});
+  node.only({"name", "monitor", "size", "latency_ms", "stereo", "wall_mm"});
   device::DisplayConfig display;
   display.name = node.at("name").text();
   const std::string monitor = node.at("monitor").text();
@@ -55,6 +70,8 @@ device::DisplayConfig read_display(const ConfigNode& node) {
     display.latency_s = latency->number() / 1000;
     if (display.latency_s < 0) latency->problem("expected a number >= 0.");
   }
+  if (const auto stereo = node.find("stereo")) display.stereo = k_stereo_layouts.read(*stereo);
+  if (const auto wall = node.find("wall_mm")) display.wall = wall_of(*wall);
   return display;
 }
 
@@ -143,6 +160,12 @@ Result<Devices> matched(const Devices& devices, const Rig& rig) {
   for (device::DisplayConfig& display : fitted.displays) {
     const Imager* imager = find_named(rig.projectors, display.name);
     if (!imager) continue;
+    if (display.wall)
+      return error(
+          "{}: {}: expected wall_mm at a screen only, found it at a projector of the rig, whose place is in "
+          "the "
+          "rig. Remove wall_mm.",
+          devices.file.string(), display.name);
     const cv::Size size(imager->width, imager->height);
     if (!display.size.empty() && display.size != size)
       return size_differs(devices, display.name, display.size, *imager);

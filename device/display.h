@@ -5,6 +5,7 @@
 
 #include "core/frame.h"
 #include "core/result.h"
+#include "core/stereo.h"
 
 namespace limn::device {
 
@@ -21,6 +22,12 @@ class Display {
   /// device (`shown_at`), which may be in the future. Error when the image's size or type is wrong or the
   /// device is gone.
   virtual Result<Stamp> show(const cv::Mat& image) = 0;
+
+  /// Whether the device shows an image for each eye of a person who wears stereo glasses.
+  virtual bool is_stereo() const { return false; }
+  /// As show(), with an image for each eye. Every image has size(), whatever the layout. A device that is not
+  /// in stereo shows the left one.
+  virtual Result<Stamp> show_eyes(const EyeImages& images) { return show(images.left); }
 };
 
 }  // namespace limn::device

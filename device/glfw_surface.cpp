@@ -39,10 +39,19 @@ class ContextKept {
   EGLSurface draw_, read_;
 };
 
+// Without a current EGL context another interface (GLX) can have one.
+void release_context() {
+  if (const EGLDisplay display = eglGetCurrentDisplay(); display != EGL_NO_DISPLAY)
+    eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, EGL_NO_CONTEXT);
+}
+
 // Makes a window's context current, and in its destructor the former one.
 class Current {
  public:
-  explicit Current(GLFWwindow* window) { glfwMakeContextCurrent(window); }
+  explicit Current(GLFWwindow* window, bool is_native) {
+    if (is_native) release_context();
+    glfwMakeContextCurrent(window);
+  }
 
  private:
   ContextKept kept_;
@@ -58,8 +67,11 @@ std::string glfw_problem() {
 
 Result<GlfwSurface> GlfwSurface::open(const Options& options) {
   const ContextKept kept;  // GLFW makes the new window's context current for a moment, then none
-  // Windows use EGL, as contexts without a window do.
-  glfwWindowHint(GLFW_CONTEXT_CREATION_API, GLFW_EGL_CONTEXT_API);
+  // Windows use EGL, as contexts without a window do; but only GLX has framebuffers for two eyes.
+  if (options.quad_buffer) release_context();
+  glfwWindowHint(GLFW_CONTEXT_CREATION_API,
+                 options.quad_buffer ? GLFW_NATIVE_CONTEXT_API : GLFW_EGL_CONTEXT_API);
+  glfwWindowHint(GLFW_STEREO, options.quad_buffer ? GLFW_TRUE : GLFW_FALSE);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 4);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 5);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -69,9 +81,16 @@ Result<GlfwSurface> GlfwSurface::open(const Options& options) {
   GlfwSurface surface;
   surface.window_ =
       glfwCreateWindow(options.width, options.height, options.title.c_str(), options.monitor, nullptr);
+  surface.quad_buffer_ = options.quad_buffer;
+  if (!surface.window_ && options.quad_buffer)
+    return error(
+        "{}: expected OpenGL with a framebuffer for each eye (quad_buffer), the display gives none ({}). "
+        "Switch "
+        "stereo on in the graphics driver's settings, or use side_by_side, top_bottom or frame_sequential.",
+        options.title, glfw_problem());
   if (!surface.window_)
     return error("window: expected a window with OpenGL 4.5, the display gives none ({}).", glfw_problem());
-  const Current current(surface.window_);
+  const Current current(surface.window_, options.quad_buffer);
   glfwSwapInterval(options.vsync ? 1 : 0);
   return surface;
 }
@@ -80,20 +99,22 @@ GlfwSurface::GlfwSurface(GlfwSurface&& other) noexcept
     : window_(std::exchange(other.window_, nullptr)),
       texture_(std::exchange(other.texture_, 0)),
       framebuffer_(std::exchange(other.framebuffer_, 0)),
-      size_(other.size_) {}
+      size_(other.size_),
+      quad_buffer_(other.quad_buffer_) {}
 
 GlfwSurface& GlfwSurface::operator=(GlfwSurface&& other) noexcept {
   std::swap(window_, other.window_);
   std::swap(texture_, other.texture_);
   std::swap(framebuffer_, other.framebuffer_);
   std::swap(size_, other.size_);
+  std::swap(quad_buffer_, other.quad_buffer_);
   return *this;
 }
 
 GlfwSurface::~GlfwSurface() {
   if (!window_) return;
   {
-    const Current current(window_);
+    const Current current(window_, quad_buffer_);
     glDeleteFramebuffers(1, &framebuffer_);
     glDeleteTextures(1, &texture_);
   }
@@ -116,11 +137,16 @@ void GlfwSurface::upload(const cv::Mat& image) {
   glTextureSubImage2D(texture_, 0, 0, 0, size_.width, size_.height, GL_BGR, GL_UNSIGNED_BYTE, bgr.data);
 }
 
+void GlfwSurface::draw() const {
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  draw_into_back_buffer();
+  glfwSwapBuffers(window_);
+}
+
 // Draws the image as large as fits, centred. The image's first row is at v = 0, so the window's y is
 // inverted.
-void GlfwSurface::draw() const {
+void GlfwSurface::draw_into_back_buffer() const {
   const cv::Size window = pixels();
-  glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glClearColor(0, 0, 0, 1);
   glClear(GL_COLOR_BUFFER_BIT);
   if (framebuffer_ != 0 && size_.width > 0) {
@@ -131,31 +157,47 @@ void GlfwSurface::draw() const {
     glBlitNamedFramebuffer(framebuffer_, 0, 0, 0, size_.width, size_.height, left, bottom + shown_height,
                            left + shown_width, bottom, GL_COLOR_BUFFER_BIT, GL_LINEAR);
   }
-  glfwSwapBuffers(window_);
 }
 
 void GlfwSurface::show(const cv::Mat& image, bool wait_for_swap) {
   LIMN_CHECK(image.depth() == CV_8U && (image.channels() == 1 || image.channels() == 3));
-  const Current current(window_);
+  const Current current(window_, quad_buffer_);
   upload(image);
   draw();
   if (wait_for_swap) glFinish();
 }
 
+void GlfwSurface::show_eyes(const EyeImages& images, bool wait_for_swap) {
+  LIMN_CHECK(quad_buffer_);
+  const Current current(window_, quad_buffer_);
+  glBindFramebuffer(GL_FRAMEBUFFER, 0);
+  const std::pair<const cv::Mat&, GLenum> eyes[] = {
+      {images.left, GL_BACK_LEFT}, {images.is_stereo() ? images.right : images.left, GL_BACK_RIGHT}};
+  for (const auto& [image, buffer] : eyes) {
+    upload(image);
+    glDrawBuffer(buffer);
+    draw_into_back_buffer();
+  }
+  glDrawBuffer(GL_BACK);
+  glfwSwapBuffers(window_);
+  if (wait_for_swap) glFinish();
+}
+
 void GlfwSurface::redraw() const {
-  const Current current(window_);
+  if (quad_buffer_) return;  // only one eye's image is still there
+  const Current current(window_, quad_buffer_);
   draw();
 }
 
 void GlfwSurface::draw_with(const std::function<void(cv::Size)>& paint) const {
-  const Current current(window_);
+  const Current current(window_, quad_buffer_);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   paint(pixels());
   glfwSwapBuffers(window_);
 }
 
 void GlfwSurface::in_context(const std::function<void()>& work) const {
-  const Current current(window_);
+  const Current current(window_, quad_buffer_);
   work();
 }
 

@@ -40,7 +40,7 @@ struct MonitorDisplay::Impl {
   std::optional<GlfwSurface> surface;  // none while the monitor is unplugged
 
   Status begin(const Handle& monitor);
-  Result<Stamp> show(const cv::Mat& image);
+  Result<Stamp> show(const EyeImages& images);
 };
 
 Status MonitorDisplay::Impl::begin(const Handle& monitor) {
@@ -50,7 +50,8 @@ Status MonitorDisplay::Impl::begin(const Handle& monitor) {
                                        .height = size.height,
                                        .monitor = monitor.second,
                                        .refresh_hz = monitor.first.refresh_hz,
-                                       .vsync = options.vsync}));
+                                       .vsync = options.vsync,
+                                       .quad_buffer = options.quad_buffer}));
   glfwSetInputMode(surface->window(), GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glfwPollEvents();
   const cv::Size pixels = surface->pixels();
@@ -61,14 +62,18 @@ Status MonitorDisplay::Impl::begin(const Handle& monitor) {
       options.name, size.width, size.height, options.monitor, pixels.width, pixels.height);
 }
 
-Result<Stamp> MonitorDisplay::Impl::show(const cv::Mat& image) {
-  LIMN_TRY_STATUS(check_image(image, options.name, options.size));
+Result<Stamp> MonitorDisplay::Impl::show(const EyeImages& images) {
+  LIMN_TRY_STATUS(check_image(images.left, options.name, options.size));
+  if (images.is_stereo()) LIMN_TRY_STATUS(check_image(images.right, options.name, options.size));
   const auto monitor = found_monitor(options);
   // A window whose monitor is gone would appear on another one.
   if (!monitor || (surface && glfwGetWindowMonitor(surface->window()) != monitor->second)) surface.reset();
   if (!monitor) return monitor.error();
   if (!surface) LIMN_TRY_STATUS(begin(*monitor));
-  surface->show(image, true);
+  if (options.quad_buffer)
+    surface->show_eyes(images, true);
+  else
+    surface->show(images.left, true);
   return shifted(std::chrono::steady_clock::now(), options.latency_s);
 }
 
@@ -87,6 +92,8 @@ Result<MonitorDisplay> MonitorDisplay::open(const Desktop& desktop, const Monito
 
 const std::string& MonitorDisplay::name() const { return impl_->options.name; }
 cv::Size MonitorDisplay::size() const { return impl_->options.size; }
-Result<Stamp> MonitorDisplay::show(const cv::Mat& image) { return impl_->show(image); }
+Result<Stamp> MonitorDisplay::show(const cv::Mat& image) { return impl_->show({image}); }
+bool MonitorDisplay::is_stereo() const { return impl_->options.quad_buffer; }
+Result<Stamp> MonitorDisplay::show_eyes(const EyeImages& images) { return impl_->show(images); }
 
 }  // namespace limn::device

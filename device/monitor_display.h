@@ -13,6 +13,7 @@ struct MonitorDisplayOptions {
   cv::Size size = {};    ///< The rig's size; another mode is an error. Empty: the monitor's present mode.
   double latency_s = 0;  ///< Measured time from the swap to light.
   bool vsync = true;  ///< Each image waits for the next refresh; enable it on only one of several displays.
+  bool quad_buffer = false;  ///< With a framebuffer for each eye (OpenGL's stereo).
 };
 
 /// A projector or screen, full screen in its present mode: an image's pixels are the device's pixels. Use it
@@ -31,6 +32,8 @@ class MonitorDisplay : public Display {
   cv::Size size() const override;
   /// Uploads the image and swaps. The returned moment is the end of the swap plus the latency.
   Result<Stamp> show(const cv::Mat& image) override;
+  bool is_stereo() const override;
+  Result<Stamp> show_eyes(const EyeImages& images) override;
 
  private:
   struct Impl;

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/enum_names.h"
+#include "core/stereo.h"
+#include "core/wall.h"
 #include "device/desktop.h"
 #include "device/display.h"
 
@@ -25,6 +28,8 @@ struct DisplayConfig {
   cv::Size size = {};        ///< Size of the images, the rig's. Empty, for a monitor only: its present mode.
   double latency_s = 0;      ///< Measured time from the swap to light.
   bool vsync = true;  ///< Each image waits for the next refresh; enable it on only one of several displays.
+  StereoLayout stereo = StereoLayout::off;
+  std::optional<Wall> wall = {};  ///< Where a screen stands in the world; nullopt: anywhere.
 };
 
 /// What shows the display's images, as a devices file writes it: the monitor's name, `window` or `offscreen`.
@@ -33,7 +38,7 @@ std::string to_text(const DisplayConfig& config);
 bool needs_desktop(const DisplayConfig& config);
 
 /// Opens the display; `desktop` may be null for an offscreen one. Errors: no desktop, no such monitor, a
-/// monitor in another mode, no size.
+/// monitor in another mode, no size, no framebuffer for two eyes (StereoLayout::quad_buffer).
 Result<std::unique_ptr<Display>> open_display(const DisplayConfig& config, const Desktop* desktop);
 
 }  // namespace limn::device

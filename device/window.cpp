@@ -70,7 +70,8 @@ Result<Window> Window::open(const Desktop& desktop, const WindowOptions& options
   LIMN_TRY(GlfwSurface surface, GlfwSurface::open({.title = options.title,
                                                    .width = options.width,
                                                    .height = options.height,
-                                                   .vsync = options.vsync}));
+                                                   .vsync = options.vsync,
+                                                   .quad_buffer = options.quad_buffer}));
   auto impl = std::make_unique<Impl>(Impl{desktop, std::move(surface), options.escape_closes});
   impl->listen();
   return Window(std::move(impl));
@@ -78,6 +79,11 @@ Result<Window> Window::open(const Desktop& desktop, const WindowOptions& options
 
 void Window::show(const cv::Mat& image) {
   impl_->surface.show(image);
+  glfwPollEvents();
+}
+
+void Window::show_eyes(const EyeImages& images) {
+  impl_->surface.show_eyes(images);
   glfwPollEvents();
 }
 

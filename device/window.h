@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "core/stereo.h"
 #include "device/desktop.h"
 
 namespace limn::device {
@@ -17,6 +18,7 @@ struct WindowOptions {
   int width = 0, height = 0;
   bool vsync = true;          ///< Whether each image waits for the monitor's next refresh.
   bool escape_closes = true;  ///< If false, Escape is an ordinary key.
+  bool quad_buffer = false;   ///< With a framebuffer for each eye (OpenGL's stereo).
 };
 
 /// What a person did in a window since the last call of input().
@@ -47,6 +49,8 @@ class Window {
 
   /// Shows an 8-bit grey or BGR image from now on and handles pending events.
   void show(const cv::Mat& image);
+  /// The same with an image for each eye, in a window with `quad_buffer`.
+  void show_eyes(const EyeImages& images);
   /// Handles events and redraws the image; false once the person has closed the window or pressed Escape.
   bool is_open();
   /// The key pressed since the last call (GLFW code; letters are upper-case ASCII), 0 when none.

@@ -65,14 +65,14 @@ class DeviceSink final : public FrameSink {
     for (const auto& display : devices->screens) screens_.push_back(added(display.get(), "screen"));
   }
 
-  Status show(const ComposedFrame&, const std::vector<cv::Mat>& light) override {
+  Status show(const ComposedFrame&, const std::vector<EyeImages>& light) override {
     clock_->painted_in(1e-3 * session_->measured().paint_ms);
     double latest_s = 0;
     for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
       device::Display* display = devices_->projectors[i].get();
       if (!display) continue;
       const Stamp begun = now();
-      const Result<Stamp> shown_at = display->show(light[i]);
+      const Result<Stamp> shown_at = display->show_eyes(light[i]);
       note(projectors_[i], shown_at);
       if (shown_at) latest_s = std::max(latest_s, seconds_between(begun, *shown_at));
     }
@@ -80,23 +80,28 @@ class DeviceSink final : public FrameSink {
     return {};
   }
 
-  std::set<scene::Screen> wanted_screens() const override {
-    std::set<scene::Screen> out;
+  std::vector<ScreenRequest> wanted_screens() const override {
+    std::vector<ScreenRequest> out;
     for (const auto& screen : devices_->screens)
-      if (screen) out.insert(scene::screen_content(session_->show_state(), screen->name()));
+      if (screen) out.push_back(request_of(*screen));
     return out;
   }
 
-  // A screen that shows `off` is black.
-  void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
+  // A screen that shows `off` is black, and so is a wall that the viewer is behind.
+  void show_screens(std::span<const ScreenImages> images) override {
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       device::Display* screen = devices_->screens[i].get();
       if (!screen) continue;
-      const scene::Screen what = scene::screen_content(session_->show_state(), screen->name());
-      const cv::Mat& image = images.at(what);
-      if (image.empty() && what != scene::Screen::off) continue;
-      note(screens_[i], screen->show(image.empty() ? cv::Mat(screen->size(), CV_8UC3, cv::Scalar::all(0))
-                                                   : fitted(image, screen->size())));
+      const ScreenRequest request = request_of(*screen);
+      const auto found = std::find_if(images.begin(), images.end(),
+                                      [&](const ScreenImages& drawn) { return drawn.request == request; });
+      if (found == images.end()) continue;
+      const EyeImages& drawn = found->images;
+      if (!drawn.left.empty())
+        note(screens_[i],
+             screen->show_eyes({fitted(drawn.left, screen->size()), fitted(drawn.right, screen->size())}));
+      else if (request.what == scene::Screen::off || request.wall)
+        note(screens_[i], screen->show(cv::Mat(screen->size(), CV_8UC3, cv::Scalar::all(0))));
     }
   }
 
@@ -104,10 +109,19 @@ class DeviceSink final : public FrameSink {
   std::size_t added(const device::Display* display, const char* kind) {
     return display ? health_->add({display->name(), kind}) : 0;
   }
+  ScreenRequest request_of(const device::Display& screen) const {
+    ScreenRequest out{.what = scene::screen_content(session_->show_state(), screen.name()),
+                      .for_two_eyes = screen.is_stereo()};
+    if (const auto wall = devices_->walls.find(screen.name()); wall != devices_->walls.end()) {
+      out.wall = wall->second;
+      out.wall_pixels = screen.size();
+    }
+    return out;
+  }
   void note(std::size_t number, const Result<Stamp>& shown_at) {
     shown_at ? health_->works(number) : health_->fails(number, shown_at.message());
   }
-  // The image scaled to fit the screen, with black bars.
+  // The image scaled to fit the screen, with black bars; empty for an empty one.
   static cv::Mat fitted(const cv::Mat& image, cv::Size size);
 
   SessionDevices* devices_;
@@ -118,6 +132,7 @@ class DeviceSink final : public FrameSink {
 };
 
 cv::Mat DeviceSink::fitted(const cv::Mat& image, cv::Size size) {
+  if (image.empty()) return {};
   const double scale = std::min(1.0 * size.width / image.cols, 1.0 * size.height / image.rows);
   const cv::Size inner(std::max(1, cvRound(scale * image.cols)), std::max(1, cvRound(scale * image.rows)));
   cv::Mat out(size, image.type(), cv::Scalar::all(0));

@@ -1,10 +1,13 @@
 #pragma once
 
 #include <atomic>
+#include <map>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/result.h"
+#include "core/wall.h"
 #include "device/camera_source.h"
 #include "device/display.h"
 #include "device/key_source.h"
@@ -20,6 +23,7 @@ struct SessionDevices {
   std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< named as in the rig
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
   std::vector<std::unique_ptr<device::Display>> screens;       ///< each shows what scene::screen_content says
+  std::map<std::string, Wall> walls = {};                      ///< screens with a place in the world, by name
   std::vector<device::KeySource> keys = {};
   std::vector<DeviceState> missing = {};  ///< what could not be opened, and why
   /// Key bindings and chosen slot, shared with the operator console; null: the keys get their own.

@@ -24,14 +24,25 @@ Eigen::AlignedBox3d box_of(const scene::Scene& scene) {
 
 }  // namespace
 
-std::vector<cv::Mat> with_overlays(const ComposedFrame& composed,
-                                   const Rig& rig,
-                                   std::span<const Overlay> overlays) {
-  std::vector<cv::Mat> out = composed.projectors;
-  if (overlays.empty()) return out;
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    out[i] = out[i].clone();
-    draw(overlays, {i, rig.projectors[i], composed.posed, &out[i]});
+std::vector<cv::Mat> ComposedFrame::eye_images() const {
+  std::vector<cv::Mat> out = projectors;
+  for (const cv::Mat& image : right_eyes)
+    if (!image.empty()) out.push_back(image);
+  return out;
+}
+
+std::vector<EyeImages> with_overlays(const ComposedFrame& composed,
+                                     const Rig& rig,
+                                     std::span<const Overlay> overlays) {
+  std::vector<EyeImages> out;
+  for (std::size_t i = 0; i < composed.projectors.size(); ++i) {
+    out.push_back(composed.images(i));
+    if (overlays.empty()) continue;
+    for (cv::Mat* image : {&out[i].left, &out[i].right}) {
+      if (image->empty()) continue;
+      *image = image->clone();
+      draw(overlays, {i, rig.projectors[i], composed.posed, image});
+    }
   }
   return out;
 }
@@ -74,6 +85,7 @@ FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
   renderer_.set_quick_motion(true);
   for (const Imager& projector : subject_->rig.projectors)
     composed_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
+  composed_.right_eyes.resize(composed_.projectors.size());
 }
 
 const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
@@ -93,20 +105,39 @@ const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
   if (options_.refill && subject_->rig.projectors.size() > 1)
     shadows_.update(input.percepts, composed_.posed, shown_, &renderer_);
 
-  // Draw: parts, overlays on the surface, no light on markers, signs beside markers.
-  const std::vector<Overlay> on_surface = surface_overlays(show_state);
-  for (std::size_t i = 0; i < composed_.projectors.size(); ++i) {
-    cv::Mat& image = composed_.projectors[i];
-    image = show_state.blackout ? cv::Mat::zeros(image.size(), image.type()) : drawn(i, on_surface);
-  }
-  if (!show_state.blackout) {
-    keep_off_markers(input);
-    const std::vector<Overlay> signs = marker_overlays(input);
-    for (std::size_t i = 0; i < composed_.projectors.size(); ++i)
-      draw(signs, target(i, &composed_.projectors[i]));
-  }
-  shown_.add(composed_.projectors, input.times.shown_at);
+  draw_projectors(input);
+  std::vector<cv::Mat> light;
+  for (std::size_t i = 0; i < composed_.projectors.size(); ++i)
+    light.push_back(mean_light(composed_.images(i)));
+  shown_.add(light, input.times.shown_at);
   return composed_;
+}
+
+// Draws for each eye: parts, overlays on the surface, no light on markers, signs beside markers.
+void FrameComposer::draw_projectors(const FrameInput& input) {
+  const bool is_black = input.show_state.blackout;
+  const std::vector<Overlay> on_surface = surface_overlays(input.show_state);
+  const std::vector<Overlay> signs = is_black ? std::vector<Overlay>() : marker_overlays(input);
+  const std::vector<Body> dark = bodies_without_light(input.percepts);
+  const auto eyes = limn::eyes(composed_.viewer, 1e-3 * options_.stereo_mm);
+  const auto drawn = [&](std::size_t i, const Imager& eye) {
+    const Imager& imager = subject_->rig.projectors[i];
+    if (is_black) return cv::Mat(imager.height, imager.width, CV_8UC3, cv::Scalar::all(0));
+    cv::Mat image = fading_.image(i, eye, composed_.shown_at, &renderer_);
+    draw(on_surface, target(i, eye, &image));
+    image = keep_off_markers(image, i, dark);
+    draw(signs, target(i, eye, &image));
+    return image;
+  };
+  for (std::size_t i = 0; i < composed_.projectors.size(); ++i) {
+    composed_.projectors[i] = drawn(i, is_stereo(i) ? eyes[0] : composed_.viewer);
+    if (is_stereo(i)) composed_.right_eyes[i] = drawn(i, eyes[1]);
+  }
+}
+
+bool FrameComposer::is_stereo(std::size_t projector) const {
+  return std::count(options_.stereo_projectors.begin(), options_.stereo_projectors.end(),
+                    subject_->rig.projectors[projector].name) > 0;
 }
 
 void FrameComposer::select_viewpoint(const FrameInput& input) {
@@ -116,28 +147,24 @@ void FrameComposer::select_viewpoint(const FrameInput& input) {
   composed_.p_guest_eye_world = selected.p_guest_eye_world;
 }
 
-OverlayTarget FrameComposer::target(std::size_t projector, cv::Mat* image) {
-  return {projector,        subject_->rig.projectors[projector], composed_.posed, image, &renderer_,
-          &composed_.viewer};
+OverlayTarget FrameComposer::target(std::size_t projector, const Imager& viewer, cv::Mat* image) {
+  return {projector, subject_->rig.projectors[projector], composed_.posed, image, &renderer_, &viewer};
 }
 
-cv::Mat FrameComposer::drawn(std::size_t projector, std::span<const Overlay> on_surface) {
-  cv::Mat image = fading_.image(projector, composed_.viewer, composed_.shown_at, &renderer_);
-  draw(on_surface, target(projector, &image));
-  return image;
-}
-
-void FrameComposer::keep_off_markers(const FrameInput& input) {
-  if (options_.marker_light == tracker::MarkerLight::as_is) return;
+std::vector<Body> FrameComposer::bodies_without_light(const Percepts& percepts) const {
   std::vector<Body> bodies = bodies_;
-  for (const LooseMarker& loose : input.percepts.loose)
+  for (const LooseMarker& loose : percepts.loose)
     bodies.push_back(
         {scene::loose_body(loose.marker), {{loose.marker, loose_size_m(subject_->scene), Pose()}}});
-  for (std::size_t i = 0; i < composed_.projectors.size(); ++i) {
-    const cv::Mat mask = tracker::marker_mask(subject_->rig.projectors[i], bodies, composed_.tracks);
-    composed_.projectors[i] =
-        tracker::with_marker_light(composed_.projectors[i], mask, options_.marker_light);
-  }
+  return bodies;
+}
+
+cv::Mat FrameComposer::keep_off_markers(const cv::Mat& image,
+                                        std::size_t projector,
+                                        std::span<const Body> bodies) const {
+  if (options_.marker_light == tracker::MarkerLight::as_is) return image;
+  const cv::Mat mask = tracker::marker_mask(subject_->rig.projectors[projector], bodies, composed_.tracks);
+  return tracker::with_marker_light(image, mask, options_.marker_light);
 }
 
 // The split view (another look left of a line) and the grid.
@@ -209,15 +236,21 @@ void FrameComposer::check_drift(const Percepts& percepts) {
   drifts_.compare(percepts, composed_.posed, bodies_, composed_.tracks, shown_, &renderer_);
 }
 
-cv::Mat FrameComposer::screen(const Percepts& percepts,
-                              std::span<const Track> tracks,
-                              const scene::ShowState& show_state,
-                              scene::Screen what) {
-  if (percepts.frames.empty()) return {};
-  ScreenInput input{percepts.frames[0], show_state, scene::assign_tracks(subject_->scene, show_state, tracks),
-                    viewpoints_.selected().viewer, fading_.faded()};
-  keep_still(fading_.faded().world_from_prototype, prototype_box_, &input.tracks);
-  return screens_.image(input, what, &renderer_);
+EyeImages FrameComposer::screen(const Percepts& percepts,
+                                std::span<const Track> tracks,
+                                const scene::ShowState& show_state,
+                                const ScreenRequest& request) {
+  std::vector<TrackedFrame> cameras;
+  for (const Frame& frame : percepts.frames) {
+    const bool is_first = cameras.empty();
+    if (!is_first && !request.for_two_eyes) break;  // one eye sees camera 0's image
+    const std::vector<Track> at_frame = is_first ? std::vector(tracks.begin(), tracks.end())
+                                                 : predicted_at(percepts, options_, frame.captured_at);
+    cameras.push_back({frame, scene::assign_tracks(subject_->scene, show_state, at_frame)});
+    keep_still(fading_.faded().world_from_prototype, prototype_box_, &cameras.back().tracks);
+  }
+  return screens_.images({cameras, show_state, viewpoints_.selected().viewer, fading_.faded()}, request,
+                         &renderer_);
 }
 
 cv::Mat FrameComposer::free_surface(std::size_t projector) {

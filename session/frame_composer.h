@@ -9,6 +9,7 @@
 
 #include "core/result.h"
 #include "core/rig.h"
+#include "core/stereo.h"
 #include "projector/renderer.h"
 #include "scene/part_boxes.h"
 #include "scene/scene.h"
@@ -28,19 +29,27 @@ namespace limn::session {
 /// The images that are shown at one moment, and what they are made of.
 struct ComposedFrame {
   std::vector<cv::Mat> projectors;  ///< in the rig's order, CV_8UC3
-  std::vector<Track> tracks;        ///< predicted to shown_at
-  scene::PosedScene posed;          ///< the scene posed by the tracks and the show state
+  /// The right eye's images of projectors in stereo, whose entry in `projectors` is the left eye's; in the
+  /// rig's order, empty ones for the other projectors.
+  std::vector<cv::Mat> right_eyes;
+  std::vector<Track> tracks;  ///< predicted to shown_at
+  scene::PosedScene posed;    ///< the scene posed by the tracks and the show state
   Stamp painted_at, shown_at;
   std::string follows;  ///< the guest whose tablet is the viewpoint; empty: the scene's own viewer
   Imager viewer = {};   ///< an imager at the viewpoint that `view` parts are drawn for
   /// The viewpoint (world frame, m) while it depends on a guest's tablet or moves back from it.
   std::optional<Eigen::Vector3d> p_guest_eye_world = {};
+
+  EyeImages images(std::size_t projector) const { return {projectors[projector], right_eyes[projector]}; }
+  /// All images, without the empty ones.
+  std::vector<cv::Mat> eye_images() const;
 };
 
-/// The composed images with overlays drawn over them. Without overlays they share the memory of `composed`.
-std::vector<cv::Mat> with_overlays(const ComposedFrame& composed,
-                                   const Rig& rig,
-                                   std::span<const Overlay> overlays);
+/// The composed images with overlays drawn over them, one for each projector. Without overlays they share the
+/// memory of `composed`.
+std::vector<EyeImages> with_overlays(const ComposedFrame& composed,
+                                     const Rig& rig,
+                                     std::span<const Overlay> overlays);
 
 /// Loose markers that have been still for a second and carry no slot; a ring of light marks them. `pair`
 /// without a marker uses the last one.
@@ -64,12 +73,12 @@ class FrameComposer {
   /// After the prototype has come to rest this takes longer than a frame: call it when the images are shown.
   void check_drift(const Percepts& percepts);
 
-  /// A screen's image for the newest frame of camera 0; empty before the first frame and for Screen::off.
-  /// `tracks`: Prediction::at_image.
-  cv::Mat screen(const Percepts& percepts,
-                 std::span<const Track> tracks,
-                 const scene::ShowState& show_state,
-                 scene::Screen what);
+  /// A screen's images for the cameras' newest frames (ScreenComposer::images). `tracks`:
+  /// Prediction::at_image.
+  EyeImages screen(const Percepts& percepts,
+                   std::span<const Track> tracks,
+                   const scene::ShowState& show_state,
+                   const ScreenRequest& request);
 
   /// For each pixel of a projector, the point of the prototype (its frame, m) that it illuminates in the last
   /// composed frame, CV_32FC3. NaN where there is none, and on markers.
@@ -93,9 +102,11 @@ class FrameComposer {
   void select_viewpoint(const FrameInput& input);
   std::vector<Overlay> surface_overlays(const scene::ShowState& show_state) const;
   std::vector<Overlay> marker_overlays(const FrameInput& input) const;
-  cv::Mat drawn(std::size_t projector, std::span<const Overlay> on_surface);
-  void keep_off_markers(const FrameInput& input);
-  OverlayTarget target(std::size_t projector, cv::Mat* image);
+  void draw_projectors(const FrameInput& input);
+  cv::Mat keep_off_markers(const cv::Mat& image, std::size_t projector, std::span<const Body> bodies) const;
+  std::vector<Body> bodies_without_light(const Percepts& percepts) const;
+  OverlayTarget target(std::size_t projector, const Imager& viewer, cv::Mat* image);
+  bool is_stereo(std::size_t projector) const;
   std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;
 
   std::unique_ptr<const Subject> subject_;

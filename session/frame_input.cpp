@@ -1,23 +1,21 @@
 #include "session/frame_input.h"
 
 namespace limn::session {
-namespace {
 
 // Perception has already predicted with the filter to captured_at; its tracks are reused.
-std::vector<Track> tracks_at(const Percepts& percepts, const ComposeOptions& options, Stamp at) {
+std::vector<Track> predicted_at(const Percepts& percepts, const ComposeOptions& options, Stamp at) {
   if (at == percepts.captured_at && options.prediction == tracker::Prediction::filtered)
     return percepts.tracks;
   return tracker::predicted(percepts.motions, at, options.prediction, options.motion);
 }
 
-}  // namespace
-
 Prediction predicted_at_capture(const Percepts& percepts, const ComposeOptions& options) {
   const bool has_image = !percepts.frames.empty() && percepts.frames[0].captured_at != Stamp{};
   const Stamp image_at = has_image ? percepts.frames[0].captured_at : percepts.captured_at;
   Prediction out;
-  out.at_capture = tracks_at(percepts, options, percepts.captured_at);
-  out.at_image = image_at == percepts.captured_at ? out.at_capture : tracks_at(percepts, options, image_at);
+  out.at_capture = predicted_at(percepts, options, percepts.captured_at);
+  out.at_image =
+      image_at == percepts.captured_at ? out.at_capture : predicted_at(percepts, options, image_at);
   return out;
 }
 

@@ -21,8 +21,10 @@ struct ComposeOptions {
   double fade_s = 0.15;   ///< fade-out time of a part whose marker is lost
   double label_s = 1.2;   ///< how long a variant's name is shown beside its marker
   double lost_s = 1.5;    ///< how long a ring marks where a part was lost
-  double stereo_mm = 63;  ///< between the two viewpoints of Screen::stereo
-  bool refill = true;     ///< other projectors fill in light that a shadow blocks
+  double stereo_mm = 63;  ///< between the eyes of a person before a screen or projector in stereo
+  /// Projectors whose images are drawn for each eye of the viewer, by name.
+  std::vector<std::string> stereo_projectors = {};
+  bool refill = true;  ///< other projectors fill in light that a shadow blocks
   /// Camera 0's images are proportional to light; they are converted to sRGB for screens.
   bool is_linear_camera = false;
 };
@@ -68,6 +70,9 @@ struct FrameInput {
   std::vector<Track> tracks;  ///< Prediction::at_light, assigned to slots as the show state pairs markers
   std::span<const TabletViewpoint> places = {};  ///< tablets that the viewpoint depends on
 };
+
+/// The tracks at any moment near the last capture.
+std::vector<Track> predicted_at(const Percepts& percepts, const ComposeOptions& options, Stamp at);
 
 /// Makes a FrameInput without a Session.
 FrameInput frame_input(const scene::Scene& scene,

@@ -50,12 +50,12 @@ Result<bool> FrameLoop::step() {
   const ComposedFrame& composed = session.compose(input);
 
   // Add the clients' overlays to the projected light only.
-  const std::vector<cv::Mat> light = with_overlays(composed, session.setup().rig, client_overlays());
+  const std::vector<EyeImages> light = with_overlays(composed, session.setup().rig, client_overlays());
 
   // Show: the projectors first, because people look at them.
   LIMN_TRY_STATUS(setting_.sink.show(composed, light));
   const Stamp begun = now();
-  const std::map<scene::Screen, cv::Mat> screens = screen_images();
+  const std::vector<ScreenImages> screens = screen_images();
   const double screen_ms = screens.empty() ? -1 : milliseconds_since(begun);
   setting_.sink.show_screens(screens);
 
@@ -76,9 +76,11 @@ Result<bool> FrameLoop::step() {
   if (is_anything_seen) parts_.output.add_frame(shown, composed);
 
   // Update the clients.
-  const auto screen = screens.find(session.show_state().screen);
+  const ScreenRequest for_clients{.what = session.show_state().screen};
+  const auto screen = std::find_if(screens.begin(), screens.end(),
+                                   [&](const ScreenImages& s) { return s.request == for_clients; });
   return publish_to_clients(is_anything_seen ? &shown : nullptr,
-                            screen == screens.end() ? cv::Mat() : screen->second);
+                            screen == screens.end() ? cv::Mat() : screen->images.left);
 }
 
 void FrameLoop::apply_client_edits() {
@@ -105,18 +107,22 @@ std::vector<Overlay> FrameLoop::client_overlays() {
 }
 
 // Draws each kind of screen image once, and only those that somebody looks at.
-std::map<scene::Screen, cv::Mat> FrameLoop::screen_images() {
-  std::set<scene::Screen> wanted = setting_.sink.wanted_screens();
+std::vector<ScreenImages> FrameLoop::screen_images() {
+  std::vector<ScreenRequest> wanted = setting_.sink.wanted_screens();
   const bool is_wanted = std::any_of(parts_.clients.begin(), parts_.clients.end(),
                                      [](const SessionClient* client) { return client->wants_screen(); });
   const Stamp at = now();
   if (is_wanted &&
       (!client_screen_at_ || seconds_between(*client_screen_at_, at) >= setting_.sink.screen_interval_s())) {
-    wanted.insert(parts_.session.show_state().screen);
+    wanted.push_back({.what = parts_.session.show_state().screen});
     client_screen_at_ = at;
   }
-  std::map<scene::Screen, cv::Mat> out;
-  for (const scene::Screen what : wanted) out[what] = parts_.session.screen(what);
+  std::vector<ScreenImages> out;
+  for (const ScreenRequest& request : wanted) {
+    const auto is_same = [&](const ScreenImages& drawn) { return drawn.request == request; };
+    if (std::none_of(out.begin(), out.end(), is_same))
+      out.push_back({request, parts_.session.screen(request)});
+  }
   return out;
 }
 

@@ -2,10 +2,9 @@
 
 #include <atomic>
 #include <functional>
-#include <map>
 #include <opencv2/core/mat.hpp>
 #include <optional>
-#include <set>
+#include <span>
 #include <vector>
 
 #include "core/result.h"
@@ -13,6 +12,7 @@
 #include "session/frame_input.h"
 #include "session/perception.h"
 #include "session/recalibration_stage.h"
+#include "session/screen_request.h"
 #include "session/session.h"
 #include "session/session_client.h"
 #include "session/session_output.h"
@@ -63,10 +63,10 @@ class FrameSink {
   virtual ~FrameSink() = default;
   /// Shows `light`, one image per projector: the composed images with the clients' overlays. Error: the
   /// session cannot go on.
-  virtual Status show(const ComposedFrame& composed, const std::vector<cv::Mat>& light) = 0;
+  virtual Status show(const ComposedFrame& composed, const std::vector<EyeImages>& light) = 0;
   /// The screen images that show_screens() needs for this frame.
-  virtual std::set<scene::Screen> wanted_screens() const { return {}; }
-  virtual void show_screens(const std::map<scene::Screen, cv::Mat>&) {}
+  virtual std::vector<ScreenRequest> wanted_screens() const { return {}; }
+  virtual void show_screens(std::span<const ScreenImages>) {}
   /// The shortest time between two images of the screen that are drawn for clients.
   virtual double screen_interval_s() const { return 0; }
   /// RMS distance of the parts from their true positions, mm; -1: unknown.
@@ -97,7 +97,7 @@ class FrameLoop {
   void apply_client_edits();
   bool publish_to_clients(const ShownFrame* shown, const cv::Mat& screen);
   std::vector<Overlay> client_overlays();
-  std::map<scene::Screen, cv::Mat> screen_images();
+  std::vector<ScreenImages> screen_images();
   void note_devices();
 
   SessionParts parts_;

@@ -11,7 +11,7 @@
 namespace limn::session {
 namespace {
 
-constexpr int k_width = 1600, k_height = 1000;
+constexpr int k_window_width = 1600, k_window_height = 1000;
 constexpr int k_escape = 256;  // GLFW's code
 constexpr std::size_t k_recent = 600, k_notices = 100;
 // Side of a QR code's module: its edges stay sharp when the code is drawn smaller.
@@ -73,7 +73,7 @@ OperatorView::Remote remote_view(const Invitation& invitation) {
 }
 
 Result<OperatorConsole> OperatorConsole::open(const device::Desktop& desktop, const scene::Scene& scene) {
-  LIMN_TRY(gui::GuiWindow window, gui::GuiWindow::open(desktop, "Limn", k_width, k_height));
+  LIMN_TRY(gui::GuiWindow window, gui::GuiWindow::open(desktop, "Limn", k_window_width, k_window_height));
   return OperatorConsole(std::move(window), scene);
 }
 

@@ -55,6 +55,7 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
           {"label_s", paint.label_s},
           {"lost_s", paint.lost_s},
           {"stereo_mm", paint.stereo_mm},
+          {"stereo_projectors", paint.stereo_projectors},
           {"refill", paint.refill},
           {"screens", setup.screens}};
 }
@@ -153,7 +154,7 @@ void Recorder::record_images(const ComposedFrame& composed, std::size_t moments)
   if (ended_) return;
   write({{"paint", pose_log(composed)},
          {"moments", moments},
-         {"pictures", fmt::format("{:016x}", fingerprint(composed.projectors))}});
+         {"pictures", fmt::format("{:016x}", fingerprint(composed.eye_images()))}});
 }
 
 void Recorder::write(const nlohmann::ordered_json& event) {
@@ -223,7 +224,7 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
-             "label_s", "lost_s", "stereo_mm", "refill", "screens"});
+             "label_s", "lost_s", "stereo_mm", "stereo_projectors", "refill", "screens"});
   SessionSetup setup;
   setup.watch.full_scan_every = root.at("full_scan_every").integer();
   if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
@@ -243,6 +244,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   setup.paint.label_s = root.at("label_s").positive();
   setup.paint.lost_s = root.at("lost_s").positive();
   setup.paint.stereo_mm = root.at("stereo_mm").number();
+  if (const auto projectors = root.find("stereo_projectors"))
+    for (const ConfigNode& name : projectors->items()) setup.paint.stereo_projectors.push_back(name.text());
   setup.paint.refill = root.at("refill").boolean();
   if (const auto screens = root.find("screens"))
     for (const ConfigNode& name : screens->items()) setup.screens.push_back(name.text());

@@ -210,9 +210,9 @@ cv::Mat Session::free_surface(std::size_t projector) {
   return composer && composed().posed.world_from_prototype ? composer->free_surface(projector) : cv::Mat();
 }
 
-cv::Mat Session::screen(scene::Screen what) {
+EyeImages Session::screen(const ScreenRequest& request) {
   FrameComposer* composer = composer_.composer();
-  return composer ? composer->screen(percepts_, prediction_.at_image, show_state_, what) : cv::Mat();
+  return composer ? composer->screen(percepts_, prediction_.at_image, show_state_, request) : EyeImages();
 }
 
 }  // namespace limn::session

@@ -106,9 +106,10 @@ class Session {
   /// The files that the session keeps in the scene's folder.
   ShowStore& store() { return store_; }
   const ShowStore& store() const { return store_; }
-  /// A screen's image (FrameComposer::screen): of what is chosen for all screens, or of `what`.
+  /// A screen's image for one eye (FrameComposer::screen): of what is chosen for all screens, or of `what`.
   cv::Mat screen() { return screen(show_state_.screen); }
-  cv::Mat screen(scene::Screen what);
+  cv::Mat screen(scene::Screen what) { return screen(ScreenRequest{.what = what}).left; }
+  EyeImages screen(const ScreenRequest& request);
   /// FrameComposer::free_surface; empty while there is no GL context, or the prototype has no pose.
   cv::Mat free_surface(std::size_t projector);
 

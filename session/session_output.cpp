@@ -89,10 +89,12 @@ Status SessionOutput::close(Session* session, bool as_json) {
 // Writes the files that a session leaves in its folder.
 Status SessionOutput::write_end(Session* session, const nlohmann::ordered_json& json) const {
   if (out_.empty()) return {};
-  const std::vector<cv::Mat>& images = session->composed().projectors;
-  for (std::size_t i = 0; i < images.size(); ++i)
-    LIMN_TRY_STATUS(
-        write_png(out_ / ("projector-" + session->setup().rig.projectors[i].name + ".png"), images[i]));
+  for (std::size_t i = 0; i < session->composed().projectors.size(); ++i) {
+    const EyeImages images = session->composed().images(i);
+    const std::string name = "projector-" + session->setup().rig.projectors[i].name;
+    LIMN_TRY_STATUS(write_png(out_ / (name + ".png"), images.left));
+    if (images.is_stereo()) LIMN_TRY_STATUS(write_png(out_ / (name + "-right.png"), images.right));
+  }
   if (const cv::Mat screen = session->screen(); !screen.empty())
     LIMN_TRY_STATUS(write_png(out_ / "screen.png", screen));
   LIMN_TRY_STATUS(write_file(out_ / "session.json", json_text(json, 2) + "\n"));

@@ -293,10 +293,11 @@ class VirtualSink final : public FrameSink {
       projectors_.push_back(health->add({projector.name, "projector"}));
   }
 
-  Status show(const ComposedFrame& composed, const std::vector<cv::Mat>& light) override {
+  // The virtual cameras expose what a projector shows to both eyes.
+  Status show(const ComposedFrame& composed, const std::vector<EyeImages>& light) override {
     for (std::size_t i = 0; i < light.size(); ++i) {
       if (!is_there(i)) continue;
-      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(light[i]));
+      LIMN_TRY(const Stamp shown_at, rig_->projector(static_cast<int>(i)).show(mean_light(light[i])));
       LIMN_CHECK(shown_at == composed.shown_at);
     }
     return {};

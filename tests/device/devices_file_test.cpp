@@ -53,6 +53,41 @@ TEST(Devices, TheExampleIsReadAndFitsItsRig) {
   EXPECT_EQ(fitted->displays[2].size, cv::Size(1920, 1080));  // the size in the file
 }
 
+const std::string k_camera = R"({"name": "camera0", "source": "v4l2:/dev/video0"})";
+
+TEST(Devices, AScreenCanBeForTwoEyesAndStandInTheWorld) {
+  const auto devices = loaded(k_camera, R"({"name": "wall", "monitor": "HDMI-1", "stereo": "top_bottom",
+      "wall_mm": [[-1000, 500, 1500], [1000, 500, 1500], [-1000, 500, 300]]},
+      {"name": "projector0", "monitor": "HDMI-2"})");
+  ASSERT_TRUE(devices) << devices.message();
+  EXPECT_EQ(devices->displays[0].stereo, StereoLayout::top_bottom);
+  ASSERT_TRUE(devices->displays[0].wall);
+  EXPECT_LT((devices->displays[0].wall->bottom_left - Eigen::Vector3d(-1, 0.5, 0.3)).norm(), 1e-12);
+  EXPECT_EQ(devices->displays[1].stereo, StereoLayout::off);
+  EXPECT_FALSE(devices->displays[1].wall);
+}
+
+TEST(Devices, AWallThatIsNoneIsNamed) {
+  const auto found = [](const std::string& more) {
+    return problem(k_camera, R"({"name": "wall", "monitor": "HDMI-1", )" + more + "}");
+  };
+  expect_contains(found(R"("stereo": "3d")"), "stereo: expected");
+  expect_contains(found(R"("stereo": "3d")"), "frame_sequential");
+  expect_contains(found(R"("wall_mm": [[0, 0, 0], [1, 0, 0]])"), "wall_mm: expected the top left, top right");
+  expect_contains(found(R"("wall_mm": [[0, 0, 0], [900, 0, 0], [400, 0, -700]])"),
+                  "found an angle of 60.3 degrees");
+  expect_contains(found(R"("wall_mm": [[0, 0, 0], [900, 0, 0], [0, 0]])"), "wall_mm[2]: expected");
+  const auto devices = loaded(R"({"name": "camera0", "source": "v4l2:/dev/video0"},
+                                 {"name": "camera1", "source": "v4l2:/dev/video1"})",
+                              R"({"name": "projector0", "monitor": "HDMI-1",
+                                  "wall_mm": [[0, 0, 0], [900, 0, 0], [0, 0, -700]]},
+                                 {"name": "projector1", "monitor": "HDMI-2"})");
+  ASSERT_TRUE(devices) << devices.message();
+  const auto fitted = matched(*devices, studio_rig());
+  ASSERT_FALSE(fitted);
+  expect_contains(fitted.message(), "projector0: expected wall_mm at a screen only");
+}
+
 TEST(Devices, FilesAreNamedFromTheFilesFolder) {
   const auto devices = loaded(
       R"({"name": "a", "source": "clips/one.mp4"}, {"name": "b", "source": "/data/pictures"},

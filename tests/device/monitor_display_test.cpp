@@ -151,6 +151,29 @@ TEST_F(AMonitor, AndAWindowAreOpenedByName) {
   EXPECT_FALSE(open_display({.kind = DisplayKind::window}, &*desktop_));
 }
 
+// The virtual screens of the tests have no framebuffers for two eyes. The message says what to do, and the
+// context without a window is current again.
+TEST_F(AMonitor, WithoutFramebuffersForTwoEyesIsRefused) {
+  for (const DisplayKind kind : {DisplayKind::monitor, DisplayKind::window}) {
+    const auto display = open_display({.name = "wall",
+                                       .kind = kind,
+                                       .monitor = kind == DisplayKind::monitor ? first_.name : "",
+                                       .size = first_.size,
+                                       .stereo = StereoLayout::quad_buffer},
+                                      &*desktop_);
+    if (display) GTEST_SKIP() << "this display has framebuffers for two eyes";
+    expect_contains(display.message(), "wall: expected OpenGL with a framebuffer for each eye");
+    expect_contains(display.message(), "side_by_side");
+    GLuint texture = 0;
+    glCreateTextures(GL_TEXTURE_2D, 1, &texture);
+    EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR));
+    glDeleteTextures(1, &texture);
+  }
+  auto ordinary = MonitorDisplay::open(*desktop_, {.monitor = first_.name});
+  ASSERT_TRUE(ordinary) << ordinary.message();
+  EXPECT_TRUE(ordinary->show(quarters(first_.size, 90)));
+}
+
 TEST_F(AMonitor, OfAnotherNameOrSizeIsRefused) {
   const auto unknown = MonitorDisplay::open(*desktop_, {.name = "left", .monitor = "HDMI-9"});
   ASSERT_FALSE(unknown);

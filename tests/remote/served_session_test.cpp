@@ -57,7 +57,8 @@ class AServedSession : public AServer {
   // What a projector shows, as the frame loop hands it over.
   cv::Mat lit_by(std::size_t projector) {
     return session::with_overlays(session_->composed(), session_->setup().rig,
-                                  server_->overlays(&*session_))[projector];
+                                  server_->overlays(&*session_))[projector]
+        .left;
   }
 
   void turn() {

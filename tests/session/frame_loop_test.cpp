@@ -43,16 +43,16 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
         << "perceive() comes before edit()";
     return session->edit({"grid", "", "toggle"}, "test", now());
   }
-  Status show(const ComposedFrame& painted, const std::vector<cv::Mat>& light) override {
+  Status show(const ComposedFrame& painted, const std::vector<EyeImages>& light) override {
     calls += "show ";
     EXPECT_EQ(painted.painted_at, now());
-    covered = cv::norm(light[0], painted.projectors[0], cv::NORM_INF) > 0;
-    same = cv::norm(light[1], painted.projectors[1], cv::NORM_INF) == 0;
+    covered = cv::norm(light[0].left, painted.projectors[0], cv::NORM_INF) > 0;
+    same = cv::norm(light[1].left, painted.projectors[1], cv::NORM_INF) == 0;
     return {};
   }
-  void show_screens(const std::map<scene::Screen, cv::Mat>& images) override {
-    calls += images.empty() ? "no-screens " : "screens ";
-    for (const auto& [screen, image] : images) drawn += image.empty() ? 0 : 1;
+  void show_screens(std::span<const ScreenImages> screens) override {
+    calls += screens.empty() ? "no-screens " : "screens ";
+    for (const ScreenImages& screen : screens) drawn += screen.images.left.empty() ? 0 : 1;
   }
   double screen_interval_s() const override { return interval_s; }
   bool wants_screen() const override { return wants; }
