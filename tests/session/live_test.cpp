@@ -59,6 +59,7 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
                  {{"at_s", 0.5}, {"edit", {{"action", "light"}, {"value", "60 30 0.8 0.2 0.1"}}}},
                  {{"at_s", 0.5}, {"edit", {{"action", "marker_states"}}}},
                  {{"at_s", 0.6}, {"edit", {{"action", "next_variant"}, {"slot", "no"}}}}}));
+  options.stereo = {"projector1"};
   options.record = folder / "recording";
   options.out = folder / "out";
   const Status lived = apps::run_live(options);
@@ -70,6 +71,8 @@ TEST(Live, ASessionIsReplayedToTheLastDigit) {
   EXPECT_NE(read_file(folder / "out/session.html").value().find("next_variant mirror (script)"),
             std::string::npos);
   EXPECT_TRUE(fs::exists(folder / "out/projector-projector0.png"));
+  EXPECT_FALSE(fs::exists(folder / "out/projector-projector0-right.png"));
+  EXPECT_TRUE(fs::exists(folder / "out/projector-projector1-right.png"));
   const auto poses = lines_of(folder / "out/poses.csv");
   EXPECT_EQ(poses.size(), 1 + 21u * 2);
   EXPECT_NE(poses.back().find(",trim,"), std::string::npos);
