@@ -18,8 +18,6 @@
 #include "core/image_io.h"
 #include "core/scale_resolution.h"
 #include "device/gl_context.h"
-#include "device/image_sequence_camera.h"
-#include "session/device_session.h"
 #include "session/osc.h"
 #include "session/perception.h"
 #include "session/scene_watch.h"
@@ -261,68 +259,6 @@ TEST(Live, DrawsAnewWhenTheGraphicsCardLostIt) {
   ASSERT_EQ(notes.size(), 2u) << notes.dump();
   EXPECT_NE(notes[0].at("what").get<std::string>().find("there is no card"), std::string::npos);
   EXPECT_NE(notes[1].at("what").get<std::string>().find("drawn again"), std::string::npos);
-}
-
-// A display that keeps the last shown image.
-class Canvas : public device::Display {
- public:
-  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
-  const std::string& name() const override { return name_; }
-  cv::Size size() const override { return size_; }
-  Result<Stamp> show(const cv::Mat& image) override {
-    shown = image.clone();
-    return shifted(std::chrono::steady_clock::now(), 0.02);
-  }
-  cv::Mat shown;
-
- private:
-  std::string name_;
-  cv::Size size_;
-};
-
-// Three screens, as in a devices file; the recording has their names.
-TEST(Live, EachScreenShowsWhatWasChosenForIt) {
-  const fs::path folder = test::test_folder();
-  const sim::World world = studio_world(0.34);
-  SessionSetup setup{world.rig, *world.scene, {}, {}, {"wall", "desk", "roof"}};
-  sim::VirtualRig room(world, {.grab_waits_for_light = false});
-  const cv::Mat seen = room.camera(0).next()->image;
-  ASSERT_TRUE(write_png(folder / "seen.png", seen));
-  const auto context = device::GlContext::create();
-  ASSERT_TRUE(context) << context.message();
-  auto output = SessionOutput::open({}, folder / "recording", &setup);
-  ASSERT_TRUE(output) << output.message();
-  EXPECT_EQ(setup.screens.size(), 3u);
-  auto perception = Perception::create(setup.scene, setup.rig);
-  auto session = Session::create(setup, &output->telemetry(), output->recorder(), false);
-  ASSERT_TRUE(perception && session);
-  for (const auto& [screen, what] : {std::pair{"", "full"}, {"wall", "camera"}, {"roof", "off"}})
-    ASSERT_TRUE(session->edit({"screen", screen, what}, "test", {}));
-  SessionDevices devices;
-  devices.cameras.push_back(std::make_unique<device::ImageSequenceCamera>(
-      device::ImageSequenceCamera::open(folder / "seen.png", {.repeat = true}).value()));
-  const Imager& projector = setup.rig.projectors[0];
-  devices.projectors.resize(setup.rig.projectors.size());
-  devices.projectors[0] =
-      std::make_unique<Canvas>(projector.name, cv::Size(projector.width, projector.height));
-  std::vector<const Canvas*> screens;
-  for (const std::string& name : setup.screens) {
-    auto canvas = std::make_unique<Canvas>(name, seen.size());
-    screens.push_back(canvas.get());
-    devices.screens.push_back(std::move(canvas));
-  }
-  const std::atomic<bool> is_ended = false;
-  const Status played = play_on_devices(&devices, 1.5, is_ended, {*perception, *session, *output});
-  ASSERT_TRUE(played) << played.message();
-  for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
-  EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);
-  EXPECT_GT(cv::norm(screens[1]->shown, seen, cv::NORM_INF), 50) << "this screen shows parts";
-  EXPECT_EQ(cv::countNonZero(screens[2]->shown.reshape(1)), 0);
-  ASSERT_TRUE(output->close(&*session, false));
-  apps::ReplayOptions replay;
-  replay.session = folder / "recording";
-  const Status replayed = apps::run_replay(replay);
-  EXPECT_TRUE(replayed.ok()) << replayed.message();
 }
 
 // A camera fails and works again: parts are extrapolated, fade out, and are shown again.
