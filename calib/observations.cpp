@@ -224,39 +224,52 @@ Terms terms_of_spread(const Vector2d& p, const Eigen::Matrix2d& spread) {
   return Terms{{0, 0, 0, xx, xy, yy, 3 * x * xx, y * xx + 2 * x * xy, x * yy + 2 * y * xy, 3 * y * yy}};
 }
 
+// The labels over the whole board as a polynomial of a cell's place, robustly.
+using LabelPolynomial = Eigen::Matrix<double, k_terms, 2>;
+LabelPolynomial label_polynomial(const std::vector<CellMatch>& cells, const std::vector<Vector2d>& places) {
+  constexpr double k_far = 4;  // medians
+  LabelPolynomial labels = LabelPolynomial::Zero();
+  const auto distance = [&](size_t i) {
+    return (terms_at(places[i]) * labels - cells[i].match.px_projector.transpose()).norm();
+  };
+  double limit = std::numeric_limits<double>::infinity();
+  for (int pass = 0; pass < 3; ++pass) {
+    Eigen::Matrix<double, k_terms, k_terms> normal = Eigen::Matrix<double, k_terms, k_terms>::Zero();
+    LabelPolynomial product = LabelPolynomial::Zero();
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (distance(i) > limit) continue;
+      const Terms terms = terms_at(places[i]);
+      normal += terms.transpose() * terms;
+      product += terms.transpose() * cells[i].match.px_projector.transpose();
+    }
+    labels = normal.ldlt().solve(product);
+    std::vector<double> distances;
+    for (size_t i = 0; i < cells.size(); ++i) distances.push_back(distance(i));
+    limit = std::max(k_far * median(std::move(distances)), 1e-3);
+  }
+  return labels;
+}
+
 // Perspective and lenses bend the labels over a cell, so that their mean is not the label at its pixels'
 // mean, by a hundredth of a pixel where the board is tilted, to one side on the whole board. The bend follows
 // from a polynomial over all cells.
 void remove_bend_of_labels(std::vector<CellMatch>* cells) {
   constexpr size_t k_least_cells = 3 * k_terms;
-  constexpr double k_far = 4;  // medians from the polynomial
   if (cells->size() < k_least_cells) return;
   Vector2d middle = Vector2d::Zero();
   for (const CellMatch& cell : *cells) middle += cell.match.px_camera / static_cast<double>(cells->size());
   double size = 1;
   for (const CellMatch& cell : *cells)
     size = std::max(size, (cell.match.px_camera - middle).cwiseAbs().maxCoeff());
-  const auto place = [&](const CellMatch& cell) { return Vector2d((cell.match.px_camera - middle) / size); };
-  Eigen::Matrix<double, k_terms, 2> bend;
-  double limit = std::numeric_limits<double>::infinity();
-  for (int pass = 0; pass < 3; ++pass) {
-    Eigen::Matrix<double, k_terms, k_terms> normal = Eigen::Matrix<double, k_terms, k_terms>::Zero();
-    Eigen::Matrix<double, k_terms, 2> product = Eigen::Matrix<double, k_terms, 2>::Zero();
-    for (const CellMatch& cell : *cells) {
-      const Terms terms = terms_at(place(cell));
-      if (pass > 0 && (terms * bend - cell.match.px_projector.transpose()).norm() > limit) continue;
-      normal += terms.transpose() * terms;
-      product += terms.transpose() * cell.match.px_projector.transpose();
-    }
-    bend = normal.ldlt().solve(product);
-    std::vector<double> off;
-    for (const CellMatch& cell : *cells)
-      off.push_back((terms_at(place(cell)) * bend - cell.match.px_projector.transpose()).norm());
-    limit = std::max(k_far * median(std::move(off)), 1e-3);
+  std::vector<Vector2d> places;
+  for (const CellMatch& cell : *cells) places.emplace_back((cell.match.px_camera - middle) / size);
+  const LabelPolynomial labels = label_polynomial(*cells, places);
+  if (!labels.allFinite()) return;
+  for (size_t i = 0; i < cells->size(); ++i) {
+    CellMatch& cell = (*cells)[i];
+    const Terms bend = terms_of_spread(places[i], cell.spread / (size * size));
+    cell.match.px_projector -= (bend * labels).transpose();
   }
-  if (!bend.allFinite()) return;
-  for (CellMatch& cell : *cells)
-    cell.match.px_projector -= (terms_of_spread(place(cell), cell.spread / (size * size)) * bend).transpose();
 }
 
 // The pixels of one square, by cell. `least_contrast`: minimum contrast of the 3 x 3 around each pixel.

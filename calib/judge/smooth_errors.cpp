@@ -12,7 +12,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::Vector2d;
 
-constexpr Eigen::Index k_terms = 6;  // of a polynomial of degree 2
+constexpr Eigen::Index k_terms = 6;  // a polynomial of degree 2 has so many
 constexpr Eigen::Index k_least_matches = 3 * k_terms;
 
 // Orthonormal polynomials of the camera's pixel, matches x terms.

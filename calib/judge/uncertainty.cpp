@@ -290,7 +290,8 @@ Jackknife jackknife_of_even_poses(const Observations& observations,
   return {jackknife_covariance(solution, without), (n - 1) / std::max(n, 1.0) * expected};
 }
 
-// Of the errors (mm, one for each projector) of two covariances; 1 where they are not known.
+// Ratio of the variances of errors (mm, one for each projector) that two covariances predict; 1 where
+// unknown.
 double ratio_of_variances(const std::vector<double>& above_mm, const std::vector<double>& below_mm) {
   double above = 0, below = 0;
   for (size_t i = 0; i < above_mm.size(); ++i) {
