@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <opencv2/calib3d.hpp>
@@ -168,8 +169,14 @@ struct Cell {
   }
 };
 
+// A cell's match, and the covariance of its pixels' places, px^2.
+struct CellMatch {
+  Match match;
+  Eigen::Matrix2d spread;
+};
+
 // Fits a robust plane to a cell's labels; returns the means of the inliers.
-std::optional<Match> fitted(std::vector<Labelled> pixels) {
+std::optional<CellMatch> fitted(std::vector<Labelled> pixels) {
   for (int pass = 0; pass < 3; ++pass) {
     if (static_cast<int>(pixels.size()) < k_least_pixels) return std::nullopt;
     double total = 0;
@@ -199,9 +206,70 @@ std::optional<Match> fitted(std::vector<Labelled> pixels) {
     match.px_projector = mean_label;
     match.pixels = static_cast<int>(before);
     match.stddev_px = std::hypot(std::sqrt(squared / static_cast<double>(before)), k_least_stddev_px);
-    return match;
+    return CellMatch{match, normal / total};
   }
   return std::nullopt;
+}
+
+// A polynomial of degree 3: its terms at a place, and by how much the mean of each over places that scatter
+// around it is larger.
+constexpr int k_terms = 10;
+using Terms = Eigen::Matrix<double, 1, k_terms>;
+Terms terms_at(const Vector2d& p) {
+  const double x = p.x(), y = p.y();
+  return Terms{{1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y}};
+}
+Terms terms_of_spread(const Vector2d& p, const Eigen::Matrix2d& spread) {
+  const double x = p.x(), y = p.y(), xx = spread(0, 0), xy = spread(0, 1), yy = spread(1, 1);
+  return Terms{{0, 0, 0, xx, xy, yy, 3 * x * xx, y * xx + 2 * x * xy, x * yy + 2 * y * xy, 3 * y * yy}};
+}
+
+// The labels over the whole board as a polynomial of a cell's place, robustly.
+using LabelPolynomial = Eigen::Matrix<double, k_terms, 2>;
+LabelPolynomial label_polynomial(const std::vector<CellMatch>& cells, const std::vector<Vector2d>& places) {
+  constexpr double k_far = 4;  // medians
+  LabelPolynomial labels = LabelPolynomial::Zero();
+  const auto distance = [&](size_t i) {
+    return (terms_at(places[i]) * labels - cells[i].match.px_projector.transpose()).norm();
+  };
+  double limit = std::numeric_limits<double>::infinity();
+  for (int pass = 0; pass < 3; ++pass) {
+    Eigen::Matrix<double, k_terms, k_terms> normal = Eigen::Matrix<double, k_terms, k_terms>::Zero();
+    LabelPolynomial product = LabelPolynomial::Zero();
+    for (size_t i = 0; i < cells.size(); ++i) {
+      if (distance(i) > limit) continue;
+      const Terms terms = terms_at(places[i]);
+      normal += terms.transpose() * terms;
+      product += terms.transpose() * cells[i].match.px_projector.transpose();
+    }
+    labels = normal.ldlt().solve(product);
+    std::vector<double> distances;
+    for (size_t i = 0; i < cells.size(); ++i) distances.push_back(distance(i));
+    limit = std::max(k_far * median(std::move(distances)), 1e-3);
+  }
+  return labels;
+}
+
+// Perspective and lenses bend the labels over a cell, so that their mean is not the label at its pixels'
+// mean, by a hundredth of a pixel where the board is tilted, to one side on the whole board. The bend follows
+// from a polynomial over all cells.
+void remove_bend_of_labels(std::vector<CellMatch>* cells) {
+  constexpr size_t k_least_cells = 3 * k_terms;
+  if (cells->size() < k_least_cells) return;
+  Vector2d middle = Vector2d::Zero();
+  for (const CellMatch& cell : *cells) middle += cell.match.px_camera / static_cast<double>(cells->size());
+  double size = 1;
+  for (const CellMatch& cell : *cells)
+    size = std::max(size, (cell.match.px_camera - middle).cwiseAbs().maxCoeff());
+  std::vector<Vector2d> places;
+  for (const CellMatch& cell : *cells) places.emplace_back((cell.match.px_camera - middle) / size);
+  const LabelPolynomial labels = label_polynomial(*cells, places);
+  if (!labels.allFinite()) return;
+  for (size_t i = 0; i < cells->size(); ++i) {
+    CellMatch& cell = (*cells)[i];
+    const Terms bend = terms_of_spread(places[i], cell.spread / (size * size));
+    cell.match.px_projector -= (bend * labels).transpose();
+  }
 }
 
 // The pixels of one square, by cell. `least_contrast`: minimum contrast of the 3 x 3 around each pixel.
@@ -470,15 +538,18 @@ std::vector<Match> matches_on_board(const Board& board,
                                     const Decoded& decoded) {
   cv::Mat least_contrast;
   cv::erode(decoded.contrast, least_contrast, cv::Mat());
-  std::vector<Match> matches;
+  std::vector<CellMatch> fits;
   for (const Quad& quad : board.is_shifted() ? diamonds_of(board, corners) : squares_of(board, corners)) {
     Cells cells;
     collect(quad, decoded, least_contrast, &cells);
     for (Cell& cell : cells) {
       if (!cell.keep_bright()) continue;
-      if (auto match = fitted(std::move(cell.pixels))) matches.push_back(*match);
+      if (auto fit = fitted(std::move(cell.pixels))) fits.push_back(*fit);
     }
   }
+  remove_bend_of_labels(&fits);
+  std::vector<Match> matches;
+  for (const CellMatch& fit : fits) matches.push_back(fit.match);
   return matches;
 }
 

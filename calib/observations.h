@@ -109,7 +109,8 @@ Observed joined(Observed first, Observed more);
 
 /// The matches on the board's squares for one camera, projector and pose. Squares are located by their
 /// corners (a homography each; those at the board's rim by extrapolation), so that no lens is needed. In each
-/// half square a plane is fitted robustly to the labels; the match is the mean of the inliers.
+/// half square a plane is fitted robustly to the labels; the match is the mean of the inliers, less what
+/// perspective and lenses bend the labels by.
 std::vector<Match> matches_on_board(const Board& board,
                                     const std::vector<BoardCorner>& corners,
                                     const Decoded& decoded);

@@ -302,6 +302,12 @@ PixelAspect pixel_aspect(const Solution& solution) {
   return {lens.fy() / lens.fx() - 1, std::sqrt(slope.dot(solution.covariance.topLeftCorner<2, 2>() * slope))};
 }
 
+bool has_pinhole(const Rig& rig) {
+  const auto is_pinhole = [](const Imager& imager) { return imager.lens.model.value_count() == 4; };
+  return std::any_of(rig.cameras.begin(), rig.cameras.end(), is_pinhole) ||
+         std::any_of(rig.projectors.begin(), rig.projectors.end(), is_pinhole);
+}
+
 // What costs less than a tenth of a millimetre of light.
 constexpr double k_least_aspect = 4e-4, k_least_smooth_m = 0.03e-3;
 constexpr double k_better_fit = 0.9;  // share of the corners' scatter; chance changes it by a hundredth
@@ -407,17 +413,29 @@ BoardShape board_shape(const Observations& observations, const Solution& solutio
   return {observations.board.width_m(), observations.board.height_m(), solution.twist_m};
 }
 
-Solution with_distortion_unknown(const Observations& observations, Solution solution, SolveOptions options) {
-  const auto is_pinhole = [](const Imager& imager) { return imager.lens.model.value_count() == 4; };
-  if (std::none_of(solution.rig.cameras.begin(), solution.rig.cameras.end(), is_pinhole) &&
-      std::none_of(solution.rig.projectors.begin(), solution.rig.projectors.end(), is_pinhole))
-    return solution;
-  solution.rig = with_distortion_values(std::move(solution.rig));
+SolveOptions unknown_distortion(const Solution& solution, SolveOptions options) {
+  if (!has_pinhole(solution.rig)) return options;
   options.projector_radial = k_pinhole_radial;
   options.projector_tangential = k_pinhole_tangential;
+  return options;
+}
+
+Solution with_distortion_unknown(const Observations& observations,
+                                 Solution solution,
+                                 const SolveOptions& options) {
+  if (!has_pinhole(solution.rig)) return solution;
+  const SolveOptions judging = unknown_distortion(solution, options);
+  solution.rig = with_distortion_values(std::move(solution.rig));
   solution.covariance =
-      BundleAdjuster(observations, options).covariance(unknowns_of(solution), solution.noise);
+      BundleAdjuster(observations, judging).covariance(unknowns_of(solution), solution.noise);
   return solution;
+}
+
+Eigen::MatrixXd covariance_without(const Observations& observations,
+                                   const Solution& solution,
+                                   const SolveOptions& options,
+                                   int pose) {
+  return BundleAdjuster(observations, options, pose).covariance(unknowns_of(solution), solution.noise);
 }
 
 Result<Pose> board_pose_from_cameras(const Observations& observations, const Solution& solution, int pose) {

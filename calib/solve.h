@@ -112,7 +112,16 @@ Rig with_distortion_values(Rig rig);
 /// known. The prior of these is that of lenses that pass as pinholes.
 Solution with_distortion_unknown(const Observations& observations,
                                  Solution solution,
-                                 SolveOptions options = {});
+                                 const SolveOptions& options = {});
+
+/// The options that the covariance of with_distortion_unknown() is computed with.
+SolveOptions unknown_distortion(const Solution& solution, SolveOptions options);
+
+/// Covariance of the devices' parameters without the observations of one board pose, at the same solution.
+Eigen::MatrixXd covariance_without(const Observations& observations,
+                                   const Solution& solution,
+                                   const SolveOptions& options,
+                                   int pose);
 
 /// The print's errors as a share of its size (difference of width and height, and what its smooth errors may
 /// add), where the observations show that the print has errors; 0 otherwise. They show where the corners fit

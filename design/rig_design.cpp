@@ -152,7 +152,7 @@ Result<PredictedAccuracy> predict_accuracy(const DescribedRig& described) {
   LIMN_TRY(const calib::Assessment assessment, calib::assess(observed, {}, solution));
   predicted_accuracy.error_mm = assessment.predicted_error_mm;
   calib::Uncertainty believed =
-      calib::estimated_uncertainty(observed.observations, solution, assessment.held_out.rigs);
+      calib::estimated_uncertainty(observed.observations, solution, {}, assessment.held_out);
   const double measured_px = believed.measured_px;
   believed.measured_px = 0;
   predicted_accuracy.calibration_mm = calib::propagated_error_mm(observed.observations, solution, believed);

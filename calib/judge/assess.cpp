@@ -7,6 +7,7 @@
 
 #include "calib/judge/fault_costs.h"
 #include "calib/judge/lens_uncertainty.h"
+#include "calib/judge/smooth_errors.h"
 #include "calib/judge/uncertainty.h"
 #include "core/median.h"
 
@@ -70,10 +71,12 @@ std::vector<DeviceQuality> device_qualities(const Observations& observations, co
   return qualities;
 }
 
-// For each projector: the distance on the boards, mm, that 95 % of the held-out errors stay within, with the
-// matches' own noise subtracted, because it is no error of the rig. A pose that differs from all others
-// (odd_pose) is a fault of its own: how far it moves the solution is in the jackknife.
-std::vector<double> held_out_errors_mm(const Observations& observations, const CrossValidation& score) {
+// For each projector: the distance on the boards, mm, that 95 % of the held-out errors stay within, of what
+// is smooth over a board in them: the noise of single matches is no error of the rig. A pose that differs
+// from all others (odd_pose) is a fault of its own: how far it moves the solution is in the jackknife.
+std::vector<double> held_out_errors_mm(const Observations& observations,
+                                       const Solution& solution,
+                                       const CrossValidation& score) {
   struct Errors {
     std::vector<double> mm;
     double squared = 0, noise = 0;  // px^2
@@ -81,15 +84,20 @@ std::vector<double> held_out_errors_mm(const Observations& observations, const C
   std::set<std::string> odd;
   for (const OddPose& pose : odd_poses(score)) odd.insert(score.poses[pose.index].pose);
   std::vector<Errors> errors(observations.projectors.size());
-  for (size_t i = 0; i < observations.matches.size(); ++i) {
-    const Match& match = observations.matches[i];
-    if (!std::isfinite(score.errors_m[i]) ||
-        odd.contains(observations.poses[static_cast<size_t>(match.pose)]))
-      continue;
-    Errors& of = errors[static_cast<size_t>(match.projector)];
-    of.mm.push_back(score.errors_m[i] * 1e3);
-    of.squared += score.residuals[i].squaredNorm();
-    of.noise += 2 * match.stddev_px * match.stddev_px;
+  for (const SmoothErrors& group : smooth_errors(observations, solution, score)) {
+    if (odd.contains(observations.poses[static_cast<size_t>(group.pose)])) continue;
+    double square_m = 0, square_px = 0;
+    for (const size_t match : group.matches) {
+      if (!std::isfinite(score.errors_m[match])) continue;
+      square_m += score.errors_m[match] * score.errors_m[match];
+      square_px += score.residuals[match].squaredNorm();
+    }
+    const double mm_per_px = square_px > 0 ? 1e3 * std::sqrt(square_m / square_px) : 0;
+    Errors& of = errors[static_cast<size_t>(group.projector)];
+    for (Eigen::Index i = 0; i < group.residuals.rows(); ++i)
+      of.mm.push_back(mm_per_px * group.residuals.row(i).norm());
+    of.squared += group.residuals.squaredNorm();
+    of.noise += group.noise;
   }
   std::vector<double> p95;
   for (Errors& of : errors) {
@@ -169,13 +177,12 @@ Assessment assess(const Observed& observed,
     return assessment;
   }
   const Solution judged = with_distortion_unknown(observations, solution, options);
-  std::vector<Rig> without;
-  for (const Rig& rig : assessment.held_out.rigs) without.push_back(with_distortion_values(rig));
-  const Uncertainty uncertainty = estimated_uncertainty(observations, judged, without);
+  const Uncertainty uncertainty =
+      estimated_uncertainty(observations, judged, unknown_distortion(solution, options), assessment.held_out);
   assessment.epipolar = epipolar_residuals(solution.rig, observed.dense);
   assessment.normalised_residuals =
       normalised_residuals(observations, solution, assessment.held_out.residuals);
-  assessment.held_out_error_mm = held_out_errors_mm(observations, assessment.held_out);
+  assessment.held_out_error_mm = held_out_errors_mm(observations, solution, assessment.held_out);
   assessment.propagated_error_mm = propagated_error_mm(observations, judged, uncertainty);
   assessment.error_maps = error_maps(observations, judged, uncertainty);
   for (size_t i = 0; i < assessment.held_out_error_mm.size(); ++i)

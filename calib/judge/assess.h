@@ -29,10 +29,10 @@ struct Assessment {
   Verdict verdict = Verdict::reject;
   std::vector<DeviceQuality> devices;
   CrossValidation held_out;
-  /// 95 % errors on the surface, mm, one for each projector. Held-out: on the captured boards, with the
-  /// matches' own noise subtracted. Propagated: for a target as large as the panel in place, moved and
-  /// turned, by the estimated covariance (calib/judge/uncertainty.h). Predicted: the larger of the rig's
-  /// share of the first and of the second.
+  /// 95 % errors on the surface, mm, one for each projector. Held-out: on the captured boards, of what is
+  /// smooth over a board (calib/judge/smooth_errors.h). Propagated: for a target as large as the panel in
+  /// place, moved and turned, by the estimated covariance (calib/judge/uncertainty.h). Predicted: the larger
+  /// of the rig's share of the first and of the second.
   std::vector<double> held_out_error_mm, propagated_error_mm, predicted_error_mm;
   /// Without projectors, one for each camera: the standard deviation (px, both axes) of where the lens puts a
   /// direction, over nine tenths of its image's places, turned so that the mean shift is 0; infinite where

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 
 #include "calib/measurement_model.h"
 
@@ -262,6 +263,45 @@ Eigen::VectorXd unknowns_between(const Rig& rig, const Rig& from) {
   return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
 }
 
+// The jackknife over the poses that are not odd, and what it would be if the observations' errors were
+// independent: without a pose, an estimate moves by the difference of the two estimates' covariances.
+struct Jackknife {
+  MatrixXd found, expected;
+};
+
+Jackknife jackknife_of_even_poses(const Observations& observations,
+                                  const Solution& solution,
+                                  const SolveOptions& options,
+                                  const CrossValidation& held_out) {
+  std::set<size_t> odd;
+  for (const OddPose& pose : odd_poses(held_out)) odd.insert(pose.index);
+  const Eigen::Index size = solution.covariance.cols();
+  std::vector<Rig> without;
+  MatrixXd expected = MatrixXd::Zero(size, size);
+  for (size_t i = 0; i < held_out.rigs.size(); ++i) {
+    if (odd.contains(i)) continue;
+    without.push_back(with_distortion_values(held_out.rigs[i]));
+    const auto& names = observations.poses;
+    const auto pose = std::find(names.begin(), names.end(), held_out.poses[i].pose) - names.begin();
+    expected +=
+        covariance_without(observations, solution, options, static_cast<int>(pose)) - solution.covariance;
+  }
+  const auto n = static_cast<double>(without.size());
+  return {jackknife_covariance(solution, without), (n - 1) / std::max(n, 1.0) * expected};
+}
+
+// Ratio of the variances of errors (mm, one for each projector) that two covariances predict; 1 where
+// unknown.
+double ratio_of_variances(const std::vector<double>& above_mm, const std::vector<double>& below_mm) {
+  double above = 0, below = 0;
+  for (size_t i = 0; i < above_mm.size(); ++i) {
+    if (!std::isfinite(above_mm[i]) || !std::isfinite(below_mm[i])) continue;
+    above += above_mm[i] * above_mm[i];
+    below += below_mm[i] * below_mm[i];
+  }
+  return below > 0 ? above / below : 1;
+}
+
 }  // namespace
 
 Eigen::MatrixXd jackknife_covariance(const Solution& solution, std::span<const Rig> without) {
@@ -356,11 +396,14 @@ std::vector<double> propagated_error_mm(const Observations& observations,
 
 Uncertainty estimated_uncertainty(const Observations& observations,
                                   const Solution& solution,
-                                  std::span<const Rig> without) {
-  Uncertainty uncertainty{solution.covariance, 0};
-  const auto scatter = propagated_error_mm(observations, solution, uncertainty);
-  const auto jackknife =
-      propagated_error_mm(observations, solution, {jackknife_covariance(solution, without), 0});
+                                  const SolveOptions& options,
+                                  const CrossValidation& held_out) {
+  const auto mm = [&](const MatrixXd& covariance) {
+    return propagated_error_mm(observations, solution, {covariance, 0});
+  };
+  std::vector<Rig> without;
+  for (const Rig& rig : held_out.rigs) without.push_back(with_distortion_values(rig));
+  const auto scatter = mm(solution.covariance), jackknife = mm(jackknife_covariance(solution, without));
   // Where poses have errors of their own, the covariance from scatter is too small by up to a factor of 2 and
   // the jackknife's too large by as much: the geometric mean is used.
   double variance = 1;
@@ -368,9 +411,15 @@ Uncertainty estimated_uncertainty(const Observations& observations,
     if (std::isfinite(jackknife[i]) && scatter[i] > 0)
       variance = std::max(variance, jackknife[i] / scatter[i]);
   }
-  uncertainty.covariance *= variance;
-  uncertainty.measured_px = std::max(solution.corner_scatter_px, k_least_measured_px);
-  return uncertainty;
+  const Jackknife even = jackknife_of_even_poses(observations, solution, options, held_out);
+  const auto expected = mm(even.expected);
+  variance = std::max(variance, ratio_of_variances(mm(even.found), expected));
+  // The part of the covariance that observations give, without what all poses share (the print's size), which
+  // no noise widens. Few poses with much leverage make `expected` larger than the whole.
+  const double part = std::min(1.0, ratio_of_variances(scatter, expected));
+  const MatrixXd widening = even.expected.allFinite() ? MatrixXd(part * even.expected) : solution.covariance;
+  return {solution.covariance + (variance - 1) * widening,
+          std::max(solution.corner_scatter_px, k_least_measured_px)};
 }
 
 }  // namespace limn::calib

@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "calib/cross_validation.h"
 #include "calib/observations.h"
 #include "calib/solve.h"
 
@@ -57,10 +58,14 @@ std::vector<double> propagated_error_mm(const Observations& observations,
                                         const Uncertainty& uncertainty);
 
 /// The estimated uncertainty of a solution: its covariance (from the residuals' scatter) widened towards the
-/// jackknife's, and never narrowed. Targets are assumed to be measured as well as the board's corners were,
-/// but not better than markers are. Reasons and evidence: docs/decisions/0004-the-stated-error.md.
+/// jackknife's, and never narrowed; it is widened by all that the jackknife shows beyond what independent
+/// errors of the observations explain. `options`: those of the solution's covariance. `held_out`: the devices
+/// as solved without one pose each; poses that differ from all others count less. Targets are assumed to be
+/// measured as well as the board's corners were, but not better than markers are. Reasons and evidence:
+/// docs/decisions/0004-the-stated-error.md.
 Uncertainty estimated_uncertainty(const Observations& observations,
                                   const Solution& solution,
-                                  std::span<const Rig> without);
+                                  const SolveOptions& options,
+                                  const CrossValidation& held_out);
 
 }  // namespace limn::calib

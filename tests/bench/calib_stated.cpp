@@ -28,6 +28,8 @@ struct Group {
   bool is_badly_printed = false;  // 0.15 % unequal, 0.1 mm smooth errors
   bool has_quarter_turns = false;
   double length_stddev_m = 0;  // above 0: the print was measured to this
+  double shared_px = 0;        // errors that the matches of one placement share, as decoding leaves them
+  double unstated_px = 0;      // noise of matches beyond what they state, as JPEG and shake leave it
 };
 
 const std::vector<Group> k_groups = {
@@ -44,6 +46,16 @@ const std::vector<Group> k_groups = {
      .is_badly_printed = true,
      .has_quarter_turns = true},
     {.name = "badly printed, measured", .poses = 12, .is_badly_printed = true, .length_stddev_m = 0.03e-3},
+    {.name = "shared decoding errors", .poses = 20, .is_sharp = true, .shared_px = 0.006},
+    {.name = "all effects",
+     .poses = 12,
+     .bow_m = 0.4e-3,
+     .is_sharp = true,
+     .twist_m = 0.4e-3,
+     .is_badly_printed = true,
+     .has_quarter_turns = true,
+     .length_stddev_m = 0.03e-3,
+     .unstated_px = 0.08},
     {.name = "almost parallel", .tilt = 0.06},
     {.name = "almost parallel, in the middle", .tilt = 0.06, .spread = 0.15},
 };
@@ -132,6 +144,9 @@ void run(const Group& group, unsigned seed, Tally* tally) {
   }
   add_noise(draw.corner_px, draw.match_px, &rng, &observations);
   for (calib::Match& match : observations.matches) match.stddev_px = draw.match_px;
+  std::mt19937_64 decoding(seed + 2000);
+  add_shared_errors(group.shared_px, &decoding, &observations);
+  add_noise(0, group.unstated_px, &decoding, &observations);
   const auto choice = solved(observations, options);
   if (!choice) {
     ++tally->unsolved;

@@ -302,6 +302,27 @@ void add_noise(double corner_px, double match_px, std::mt19937_64* rng, calib::O
     match.px_projector += match_px * Vector2d(scatter(*rng), scatter(*rng));
 }
 
+void add_shared_errors(double px, std::mt19937_64* rng, calib::Observations* observations) {
+  constexpr double k_board_px = 200;  // half of a board in the camera's image
+  std::normal_distribution<double> scatter(0, px > 0 ? px : 1);
+  for (size_t pose = 0; px > 0 && pose < observations->poses.size(); ++pose) {
+    Eigen::Matrix<double, 2, 3> error;
+    for (int i = 0; i < error.size(); ++i) error(i) = scatter(*rng);
+    Vector2d middle = Vector2d::Zero();
+    double count = 0;
+    for (const calib::Match& match : observations->matches) {
+      if (match.pose != static_cast<int>(pose)) continue;
+      middle += match.px_camera;
+      ++count;
+    }
+    for (calib::Match& match : observations->matches) {
+      if (match.pose != static_cast<int>(pose)) continue;
+      const Vector2d at = (match.px_camera - middle / count) / k_board_px;
+      match.px_projector += error * Vector3d(1, at.x(), at.y());
+    }
+  }
+}
+
 std::string to_text(Prototype prototype) {
   return prototype == Prototype::panel ? "panel" : prototype == Prototype::cluster ? "cluster" : "concave";
 }

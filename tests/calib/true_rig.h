@@ -42,6 +42,9 @@ TrueRig make_true_rig(const RigOptions& options);
 /// `each`: one of this many cells is used.
 calib::Observations observed_perfectly(const TrueRig& rig, int each = 1);
 void add_noise(double corner_px, double match_px, std::mt19937_64* rng, calib::Observations* observations);
+/// Errors that the matches of one placement of the board share, as decoding leaves them: a shift and a slope
+/// over the board, of this standard deviation at its edges (px, one coordinate).
+void add_shared_errors(double px, std::mt19937_64* rng, calib::Observations* observations);
 
 /// Prototypes, metres, facing -z of their frame: a curved panel, boxes and balls in front of a plate, a
 /// trough.

@@ -210,6 +210,61 @@ TEST(Propagate, AnOddPoseHardlyWidensTheStatement) {
   EXPECT_LT(odd_mm, 2 * sound_mm);
 }
 
+// Errors that all matches of a placement share, as decoding leaves them, count as one error each and not as
+// hundreds.
+TEST(Propagate, ErrorsThatMatchesShareAreInTheUncertainty) {
+  std::mt19937_64 rng = test_rng();
+  std::vector<double> ratios;
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    const TrueRig truth = make_true_rig({.k1 = -0.05, .shift = 0.5, .poses = 20, .seed = seed});
+    calib::Observations observations = observed_perfectly(truth, 8);
+    add_noise(0.005, 0.012, &rng, &observations);
+    add_shared_errors(0.015, &rng, &observations);
+    for (calib::Match& match : observations.matches) match.stddev_px = 0.012;
+    const auto solution = calib::solve(observations);
+    ASSERT_TRUE(solution.ok()) << solution.message();
+    const auto held_out = calib::cross_validate(observations, {}, *solution);
+    ASSERT_TRUE(held_out.ok()) << held_out.message();
+    const calib::Uncertainty uncertainty =
+        calib::estimated_uncertainty(observations, *solution, {}, *held_out);
+    const double stated = calib::propagated_error_mm(observations, *solution, {uncertainty.covariance, 0})[0];
+    const scene::Mesh mesh = prototype_mesh(static_cast<Prototype>(seed % 3));
+    const auto errors = landed(truth, solution->rig, mesh, 0, 400, &rng).pooled_mm();
+    printf("[ shared   ] calibration alone: stated %.4f mm, p95 %.4f mm, of scatter %.4f mm\n", stated,
+           p95(errors), calib::propagated_error_mm(observations, *solution, {solution->covariance, 0})[0]);
+    for (const double e : errors) ratios.push_back(e / stated);
+  }
+  printf("[ shared   ] holds for %.1f %%\n", 100 * share_within(ratios, 1));
+  EXPECT_GE(share_within(ratios, 1), 0.88);
+}
+
+// Noise of single matches that they do not state, as JPEG and shake leave it, averages out over the boards.
+TEST(Propagate, NoiseThatMatchesDoNotStateHardlyWidensTheStatement) {
+  std::mt19937_64 rng = test_rng();
+  std::vector<double> ratios;
+  double widest = 0;
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    const TrueRig truth = make_true_rig({.k1 = -0.05, .shift = 0.5, .seed = seed});
+    calib::Observed observed;
+    observed.observations = observed_perfectly(truth, 2);
+    add_noise(0.01, 0.1, &rng, &observed.observations);
+    for (calib::Match& match : observed.observations.matches) match.stddev_px = 0.02;
+    const auto solution = calib::solve(observed.observations);
+    ASSERT_TRUE(solution.ok()) << solution.message();
+    const auto assessment = calib::assess(observed, {}, *solution);
+    ASSERT_TRUE(assessment.ok()) << assessment.message();
+    const double stated = assessment->predicted_error_mm[0];
+    const scene::Mesh mesh = prototype_mesh(static_cast<Prototype>(seed % 3));
+    const auto errors = landed(truth, solution->rig, mesh, k_pnp_px, 400, &rng).pooled_mm();
+    printf("[ unstated ] stated %.4f mm (held-out %.4f mm), p95 %.4f mm\n", stated,
+           assessment->held_out_error_mm[0], p95(errors));
+    widest = std::max(widest, stated / p95(errors));
+    for (const double e : errors) ratios.push_back(e / stated);
+  }
+  EXPECT_GE(share_within(ratios, 1), 0.90);
+  EXPECT_LT(widest, 2.5);
+}
+
 TEST(Propagate, ABuildThatIgnoresProjectorDistortionFailsTheMovedCheck) {
   std::mt19937_64 rng = test_rng();
   const RigOptions rig{.k1 = -0.15, .shift = 0.5, .seed = 6};
