@@ -4,8 +4,8 @@
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 
+#include "core/append_log.h"
 #include "core/result.h"
-#include "session/append_log.h"
 #include "session/recording.h"
 #include "session/session.h"
 #include "session/telemetry.h"

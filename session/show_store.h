@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "core/file_writer.h"
 #include "scene/actions.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
-#include "session/file_writer.h"
 
 namespace limn::session {
 

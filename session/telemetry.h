@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "core/append_log.h"
 #include "core/frame.h"
 #include "core/result.h"
-#include "session/append_log.h"
 
 namespace limn::session {
 

@@ -12,7 +12,7 @@
 #include "core/image_io.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
-#include "session/file_writer.h"
+#include "core/file_writer.h"
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
 

@@ -1,10 +1,10 @@
-#include "session/append_log.h"
+#include "core/append_log.h"
 
 #include <utility>
 
 #include "core/file.h"
 
-namespace limn::session {
+namespace limn {
 namespace {
 
 constexpr double k_every_s = 1;
@@ -64,4 +64,4 @@ std::optional<std::string> AppendLog::take_message() {
   return why_ + " Its lines are kept and written later.";
 }
 
-}  // namespace limn::session
+}  // namespace limn

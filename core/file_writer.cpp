@@ -1,6 +1,6 @@
-#include "session/file_writer.h"
+#include "core/file_writer.h"
 
-namespace limn::session {
+namespace limn {
 
 FileWriter::FileWriter() : thread_([this] { run(); }) {}
 
@@ -51,4 +51,4 @@ void FileWriter::run() {
   }
 }
 
-}  // namespace limn::session
+}  // namespace limn

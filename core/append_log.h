@@ -8,7 +8,7 @@
 #include "core/frame.h"
 #include "core/result.h"
 
-namespace limn::session {
+namespace limn {
 
 /// A text file to which lines are appended; it is written about once a second. While it cannot be written (a
 /// full disk), the lines are kept in memory and written later; beyond one megabyte the oldest lines are
@@ -37,4 +37,4 @@ class AppendLog {
   std::string why_;
 };
 
-}  // namespace limn::session
+}  // namespace limn

@@ -10,7 +10,7 @@
 
 #include "core/result.h"
 
-namespace limn::session {
+namespace limn {
 
 /// Runs file changes on a thread of its own, one after the other in the order of add(), so that the render
 /// thread never waits for the disk. Nothing is dropped.
@@ -41,4 +41,4 @@ class FileWriter {
   std::thread thread_;
 };
 
-}  // namespace limn::session
+}  // namespace limn

@@ -1,4 +1,4 @@
-#include "session/append_log.h"
+#include "core/append_log.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
 
-namespace limn::session {
+namespace limn {
 namespace {
 
 TEST(AppendLog, LinesWaitWhileTheDiskIsFull) {
@@ -63,4 +63,4 @@ TEST(AppendLog, OfTooManyLinesTheNewestAreKept) {
 }
 
 }  // namespace
-}  // namespace limn::session
+}  // namespace limn

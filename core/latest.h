@@ -6,7 +6,7 @@
 #include <mutex>
 #include <optional>
 
-namespace limn::session {
+namespace limn {
 
 /// Passes one value between threads: a new value replaces the old one, nothing is queued.
 template <class T>
@@ -35,4 +35,4 @@ class Latest {
   std::optional<T> value_;
 };
 
-}  // namespace limn::session
+}  // namespace limn
