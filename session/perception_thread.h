@@ -14,13 +14,16 @@
 
 namespace limn::session {
 
-/// Runs perception on a thread of its own and keeps the newest percepts for
-/// take(). Control uses of percepts that were not taken are kept.
+/// Runs perception on a thread of its own and keeps the newest percepts for take(). Control uses of percepts
+/// that were not taken are kept.
 class PerceptionThread {
-public:
-  /// Starts at once. Borrows all arguments; `recorder` may be null.
-  PerceptionThread(Perception *perception, CameraThreads *cameras,
-                   Recorder *recorder, DeviceHealth *health);
+ public:
+  /// Starts at once. Borrows all arguments; `recorder` and `feeds` may be null.
+  PerceptionThread(Perception* perception,
+                   CameraThreads* cameras,
+                   Recorder* recorder,
+                   PoseFeeds* feeds,
+                   DeviceHealth* health);
   ~PerceptionThread() { stop(); }
 
   /// The newest percepts that were not taken yet; waits up to `wait` for them.
@@ -30,21 +33,22 @@ public:
   void start();
   void stop();
 
-private:
+ private:
   struct Seen {
     Percepts percepts;
     std::size_t moments = 0;
   };
   void run();
 
-  Perception *perception_;
-  CameraThreads *cameras_;
-  Recorder *recorder_;
-  DeviceHealth *health_;
-  std::size_t moments_ = 0; // used by the thread only
+  Perception* perception_;
+  CameraThreads* cameras_;
+  Recorder* recorder_;
+  PoseFeeds* feeds_;
+  DeviceHealth* health_;
+  std::size_t moments_ = 0;  // used by the thread only
   Latest<Seen> seen_;
   std::atomic<bool> is_stopping_ = false;
   std::thread thread_;
 };
 
-} // namespace limn::session
+}  // namespace limn::session
