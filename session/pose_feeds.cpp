@@ -12,12 +12,12 @@
 namespace limn::session {
 namespace {
 
-constexpr auto k_longest_receiving = std::chrono::milliseconds(5);
+constexpr auto k_longest_reading = std::chrono::milliseconds(5);
 constexpr double k_between_refusals_s = 1;
 constexpr int k_most_thrown_away = 4096;  // datagrams of a flood in one call
 
 // The names by which a trackers' file calls the scene's bodies, and the tracker's names for them.
-std::map<std::string, tracker::FeedBody> bodies_of(const scene::Scene& scene) {
+std::map<std::string, tracker::FeedBody> named_bodies(const scene::Scene& scene) {
   std::map<std::string, tracker::FeedBody> out;
   for (const Body& body : scene::bodies(scene)) out[body.name] = {"", body.name, std::nullopt};
   for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
@@ -106,7 +106,7 @@ Result<std::vector<FeedConfig>> load_feeds(const std::filesystem::path& path, co
   config.root().only({"schema", "trackers"});
   std::vector<FeedConfig> feeds;
   for (const ConfigNode& node : config.root().at("trackers").items()) {
-    feeds.push_back(read_feed(node, bodies_of(scene)));
+    feeds.push_back(read_feed(node, named_bodies(scene)));
     for (std::size_t i = 0; i + 1 < feeds.size(); ++i)
       if (feeds[i].setup.name == feeds.back().setup.name)
         node.at("name").problem("expected another name for each tracker, found it twice.");
@@ -134,7 +134,7 @@ FeedInput PoseFeeds::received(Stamp at, bool is_real_time) {
   for (std::size_t i = 0; i < feeds_.size(); ++i) {
     FeedInput one;
     one.poses.resize(1);
-    const Stamp until = now() + k_longest_receiving / static_cast<int>(feeds_.size());
+    const Stamp until = now() + k_longest_reading / static_cast<int>(feeds_.size());
     receive(at, is_real_time, until, &feeds_[i], &one);
     feeds_[i].read_at = at;
     out.poses[i] = std::move(one.poses[0]);

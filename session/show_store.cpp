@@ -5,7 +5,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
-#include "scene/contact_sheet.h"
+#include "session/contact_sheet.h"
 
 namespace limn::session {
 namespace {
@@ -127,9 +127,8 @@ void ShowStore::keep_looks(const fs::path& folder,
           [=, name = look.name, image = look_image()] { return write_look(folder, name, text, image); });
   }
   if (has_changed)
-    writer_->add([=, looks = after.looks] {
-      return scene::write_contact_sheet(looks, folder, folder / "looks.html");
-    });
+    writer_->add(
+        [=, looks = after.looks] { return write_contact_sheet(looks, folder, folder / "looks.html"); });
 }
 
 void ShowStore::finish() {

@@ -17,8 +17,8 @@ namespace limn::exchange {
 struct PsnPacket {
   double sent_at_s = 0;                        ///< on the server's clock
   int frame = 0, packets_of_frame = 1;         ///< 8 bits each
-  std::vector<ForeignPose> poses;              ///< of a data packet; a sensor's name is the tracker's number
-  std::map<std::uint16_t, std::string> names;  ///< of an info packet, by number
+  std::vector<ForeignPose> poses;              ///< in a data packet; a sensor's name is the tracker's number
+  std::map<std::uint16_t, std::string> names;  ///< in an info packet, by number
 };
 
 /// Decodes a data or an info packet. A tracker without a position is left out; one without an orientation has

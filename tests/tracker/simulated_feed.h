@@ -15,10 +15,10 @@ struct SimulatedFeed {
   double delay_s = 0.06;    // from the moment of a pose to its arrival, at least
   double jitter_s = 0.003;  // mean of what is added to it
   double rate_hz = 60, camera_hz = 30;
-  double drift = 1e-4;  // of the feed's clock
+  double drift = 1e-4;  // the feed's clock is fast by this share
   bool states_times = true;
-  double turn_noise = 2e-3, shift_noise = 0.4e-3;          // of the feed, rad and m
-  double own_turn_noise = 3e-3, own_shift_noise = 0.5e-3;  // of our cameras
+  double turn_noise = 2e-3, shift_noise = 0.4e-3;          // the feed's, rad and m
+  double own_turn_noise = 3e-3, own_shift_noise = 0.5e-3;  // our cameras'
   std::mt19937_64 rng;
   Pose world_from_feed, body_from_sensor;
   Eigen::Matrix<double, 6, 3> phase, hz;

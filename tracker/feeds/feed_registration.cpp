@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 using Matrix6x12d = Eigen::Matrix<double, 6, 12>;
 
 constexpr double k_degrees = 180 / std::numbers::pi;
-constexpr double k_remembered_s = 6;          // of both systems' poses
+constexpr double k_remembered_s = 6;          // poses of both systems
 constexpr double k_nearest_samples_s = 4e-3;  // samples that come faster are left out
 constexpr std::size_t k_most_samples = 1600, k_most_own = 1000;
 // Between samples further apart nothing is interpolated. The velocity is taken over twice k_velocity_s.
@@ -31,7 +31,7 @@ constexpr double k_speed_span_s = 0.1, k_fastest_turn = 20;
 constexpr std::size_t k_most_interleaved = 6;  // speeds in each span
 // How well messages are stamped: their jitter, standard deviation.
 constexpr double k_stamp_stddev_s = 2e-3;
-constexpr double k_least_noise_share = 0.2;  // of the assumed noise
+constexpr double k_least_noise_share = 0.2;  // as a share of the assumed noise
 constexpr double k_outlier = 4;              // standard deviations
 // A registration is used when it takes the body to its place with these standard deviations.
 constexpr double k_usable_shift = 5e-3, k_usable_turn = 1 / k_degrees;

@@ -28,7 +28,7 @@ struct FeedSample {
 /// How a feed's poses of one sensor relate to a body in the room.
 struct Registration {
   HandEye hand_eye;
-  Delay delay;      ///< of FeedSample::at behind the moment that the pose shows
+  Delay delay;      ///< FeedSample::at is so much later than the moment that the pose shows
   FeedNoise noise;  ///< as the pairs' residuals show it
   int pairs = 0;
 

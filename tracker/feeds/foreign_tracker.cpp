@@ -313,7 +313,7 @@ std::vector<std::string> ForeignTracker::take_notes(Stamp now) {
   }
   if (const auto note = clock_.take_note())
     notes.push_back(fmt::format("tracker {}: {}.", setup_.name, *note));
-  if (refused_ > 0 && !std::exchange(has_told_refused_, true))
+  if (refused_ > 0 && !std::exchange(is_refusal_reported_, true))
     notes.push_back(fmt::format("tracker {}: poses that are not finite are left out.", setup_.name));
   return notes;
 }

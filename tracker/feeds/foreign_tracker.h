@@ -53,7 +53,7 @@ struct FeedStatus {
   FeedState state = FeedState::waiting;
   std::string advice = {};               ///< what to do, or why; empty: nothing
   std::optional<Delay> delay = {};       ///< measured against our cameras
-  double stddev_mm = 0, stddev_deg = 0;  ///< of the registration at the body, where it is registered
+  double stddev_mm = 0, stddev_deg = 0;  ///< registration errors at the body, where registered
 };
 
 /// The poses of one other tracking system as motions of bodies in the room. It knows no sockets and no clock
@@ -97,7 +97,7 @@ class ForeignTracker {
   FeedClock clock_;
   std::vector<Sensor> sensors_;
   std::size_t refused_ = 0;
-  bool has_told_refused_ = false;
+  bool is_refusal_reported_ = false;
 };
 
 /// The best estimate of a body's motion by our cameras and a feed, both up to now: combined by their

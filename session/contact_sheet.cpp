@@ -1,4 +1,4 @@
-#include "scene/contact_sheet.h"
+#include "session/contact_sheet.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include "core/image_io.h"
 #include "core/names.h"
 
-namespace limn::scene {
+namespace limn::session {
 namespace {
 
 constexpr int k_width = 960;  // largest width of an image, pixels
@@ -27,17 +27,18 @@ std::string image_html(const std::filesystem::path& file, const std::string& nam
 
 }  // namespace
 
-Status write_contact_sheet(std::span<const Look> looks,
+Status write_contact_sheet(std::span<const scene::Look> looks,
                            const std::filesystem::path& folder,
                            const std::filesystem::path& page) {
   std::string html = "<h1>Looks</h1>\n<div class=\"looks\">\n";
-  for (const Look& look : looks) {
+  for (const scene::Look& look : looks) {
     std::vector<std::string> parts;
-    for (const Look::Part& part : look.parts) parts.push_back(fmt::format("{}: {}", part.slot, part.variant));
+    for (const scene::Look::Part& part : look.parts)
+      parts.push_back(fmt::format("{}: {}", part.slot, part.variant));
     html +=
         html_figure(image_html(folder / (look.name + ".png"), look.name), look.name, joined_names(parts, ""));
   }
   return write_file(page, html_page("Limn: looks", HtmlColours::dark, k_sheet_style, html + "</div>\n"));
 }
 
-}  // namespace limn::scene
+}  // namespace limn::session
