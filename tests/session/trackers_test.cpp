@@ -211,6 +211,35 @@ TEST(Trackers, WrongFilesAreRefusedWithTheKey) {
   EXPECT_NE(feeds_of({good, good}).message().find("another name"), std::string::npos);
 }
 
+// Glasses without a marker: another system states where they are, without a rotation.
+TEST(Trackers, ATrackedViewerIsWhereTheOtherSystemSees) {
+  scene::Scene scene = *studio_world().scene;
+  scene.viewers.resize(1);
+  scene.viewers[0].fixed.reset();
+  scene.viewers[0].is_tracked = true;
+  PerceptionOptions options;
+  const Pose world_from_feed(exp_rotation({0, 0, M_PI / 2}), {1, 0, 0});
+  options.feeds = {{"lab", {{"hat", scene::viewer_body(0), std::nullopt, true}}, world_from_feed}};
+  auto perception = Perception::create(scene, studio_world().rig, options);
+  ASSERT_TRUE(perception) << perception.message();
+  ForeignPose hat{"hat", Pose(Eigen::Quaterniond::Identity(), {0.5, 0.2, 1.7})};
+  hat.has_rotation = false;
+  const Percepts& percepts = perception->watch({}, {{{{hat, shifted({}, 2)}}}, {}});
+  EXPECT_EQ(percepts.captured_at, shifted({}, 2));
+  ASSERT_EQ(percepts.tracks.size(), 1U);
+  const scene::PosedScene posed = scene::posed(scene, percepts.tracks);
+  ASSERT_EQ(posed.viewpoints.size(), 1U);
+  EXPECT_LT((posed.viewpoints[0].p_world - Eigen::Vector3d(0.8, 0.5, 1.7)).norm(), 1e-6);
+  ASSERT_EQ(percepts.feed_notes.size(), 1U);
+  EXPECT_NE(percepts.feed_notes[0].find("lab: (viewer 0) is registered"), std::string::npos)
+      << percepts.feed_notes[0];
+  // A slot needs the rotation, too: it is not shown by a position alone.
+  options.feeds[0].bodies = {{"hat", "mirror", std::nullopt}};
+  auto other = Perception::create(scene, studio_world().rig, options);
+  EXPECT_TRUE(other->watch({}, {{{{hat, shifted({}, 2)}}}, {}}).tracks.empty());
+  EXPECT_NE(other->percepts().feeds[0].advice.find("positions only"), std::string::npos);
+}
+
 // ---- sockets ----
 
 TEST(Trackers, AFloodAndForeignBytesAreRefusedInWords) {

@@ -98,7 +98,9 @@ FeedNoise noise_of(const ForeignPose& pose) {
 }
 
 bool is_usable(const ForeignPose& pose) {
+  constexpr double k_off_unit = 1e-3;
   return pose.is_lost || (pose.feed_from_sensor.is_finite() &&
+                          std::abs(pose.feed_from_sensor.rotation.norm() - 1) < k_off_unit &&
                           pose.feed_from_sensor.translation.cwiseAbs().maxCoeff() <= k_farthest_m);
 }
 
@@ -314,7 +316,8 @@ std::vector<std::string> ForeignTracker::take_notes(Stamp now) {
   if (const auto note = clock_.take_note())
     notes.push_back(fmt::format("tracker {}: {}.", setup_.name, *note));
   if (refused_ > 0 && !std::exchange(is_refusal_reported_, true))
-    notes.push_back(fmt::format("tracker {}: poses that are not finite are left out.", setup_.name));
+    notes.push_back(fmt::format(
+        "tracker {}: poses with numbers that are not finite, or no rotation, are left out.", setup_.name));
   return notes;
 }
 
