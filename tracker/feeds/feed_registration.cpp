@@ -258,7 +258,10 @@ std::vector<PosePair> FeedRegistration::pose_pairs(double delay_s, const FeedNoi
 double FeedRegistration::refined_delay(const std::vector<PosePair>& pairs,
                                        const HandEye& solution,
                                        double* stddev_s) const {
-  double right = 0, matrix = 0;
+  // Pairs of a body that stands still say nothing; then the delay stays as it was.
+  constexpr double k_least_prior_s = 5e-3;
+  const double prior_s = std::max(delay_->stddev_s, k_least_prior_s);
+  double right = 0, matrix = 1 / (prior_s * prior_s);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Residual residual = residual_of(pairs[i], solution);
     const Matrix6d covariance = residual.of_body + residual.of_sensor;
@@ -270,7 +273,6 @@ double FeedRegistration::refined_delay(const std::vector<PosePair>& pairs,
     right += weighted.dot(residual.value);
     matrix += weighted.dot(along);
   }
-  if (!(matrix > 0)) return 0;
   *stddev_s = std::max(1.0, solution.normalised_rms) / std::sqrt(matrix);
   constexpr double k_most_s = 0.02;
   return std::clamp(right / matrix, -k_most_s, k_most_s);
