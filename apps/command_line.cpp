@@ -846,6 +846,7 @@ void add_live(CLI::App& app, Run& run) {
       "--window\n"
       "Example: limn live --rig rig --scene config/scenes/door --seconds 10 --record recording\n"
       "Example: limn live --osc 9000 --osc-to 127.0.0.1:9001   (docs/osc.md)\n"
+      "Example: limn live --trackers trackers.json --window   (docs/trackers.md)\n"
       "Example: limn live --window --serve 8080   (docs/remote.md)");
   auto options = std::make_shared<LiveOptions>();
   command->add_option(
@@ -866,7 +867,7 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option(
       "--resolution", options->resolution,
       "Scale of the virtual devices' image sides, over 0 and at most 1. Without it 1, or with "
-      "--window, --serve or --osc what this machine computes in real time");
+      "--window, --serve, --osc or --trackers what this machine computes in real time");
   command->add_option("--record", options->record, "Folder for a recording that limn replay can play");
   command->add_option("--out", options->out,
                       "Folder for poses.csv, telemetry.csv, session.html and the last images");
@@ -885,6 +886,11 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--osc-from", options->osc_from,
                       "Numeric address of the only machine whose OSC messages are accepted");
   command->add_option("--osc-to", options->osc_to, "HOST:PORT to which changes are sent by OSC");
+  command->add_option("--trackers", options->trackers,
+                      "File that names other tracking systems whose poses are used (limn.trackers/1)");
+  command->add_option("--poses-out", options->poses_out,
+                      "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
+                      "freed or json; may be repeated");
   command->add_option("--serve", options->serve,
                       "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
                       "machine only, a network address is encrypted");
@@ -900,7 +906,8 @@ void add_live(CLI::App& app, Run& run) {
   command->add_flag("--json", options->json, "Print JSON instead of lines");
   command->callback([options, &run] {
     // People and programs that take part in a session live in real time.
-    options->is_real_time = options->window || !options->serve.empty() || !options->osc.empty();
+    options->is_real_time =
+        options->window || !options->serve.empty() || !options->osc.empty() || !options->trackers.empty();
     run = [options] { return report_result(run_live(*options)); };
   });
 }

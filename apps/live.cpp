@@ -26,6 +26,8 @@
 #include "session/operator_console.h"
 #include "session/osc_port.h"
 #include "session/perception.h"
+#include "session/pose_feeds.h"
+#include "session/pose_sender.h"
 #include "session/script.h"
 #include "session/session.h"
 #include "session/session_output.h"
@@ -205,6 +207,13 @@ Status run_session(const LiveOptions& options,
   log_info("live: {}", context->description());
   LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to, options.osc_from));
   LIMN_TRY(const std::unique_ptr<remote::Server> server, serve(options, setup));
+  std::unique_ptr<session::PoseFeeds> feeds;
+  if (!options.trackers.empty()) {
+    LIMN_TRY(const std::vector<session::FeedConfig> trackers,
+             session::load_feeds(options.trackers, setup.scene));
+    LIMN_TRY(feeds, session::PoseFeeds::open(trackers));
+    for (const session::FeedConfig& tracker : trackers) setup.watch.feeds.push_back(tracker.setup);
+  }
   LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, options.record, &setup));
   LIMN_TRY(session::Perception perception, session::Perception::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(session::Session session, session::Session::create(setup, &output.telemetry(), output.recorder()));
@@ -215,7 +224,8 @@ Status run_session(const LiveOptions& options,
     LIMN_TRY(console, session::OperatorConsole::open(*desktop, setup.scene));
     if (server) console->invite(server.get());
   }
-  session::SessionParts parts{perception, session, output, {&osc}};
+  LIMN_TRY(session::PoseSender sender, session::PoseSender::open(options.poses_out));
+  session::SessionParts parts{perception, session, output, {&osc, &sender}, feeds.get()};
   if (server) parts.clients.push_back(server.get());
   if (console) parts.clients.push_back(&*console);
   LIMN_TRY_STATUS(play(parts, console ? &console->keys() : nullptr));

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "tracker/marker_light.h"
@@ -27,14 +28,16 @@ struct LiveOptions {
   bool window = false;
   tracker::Prediction prediction = tracker::Prediction::filtered;
   tracker::MarkerLight marker_light = tracker::MarkerLight::keep_out;
-  std::vector<std::string> stereo;  ///< Projectors of the virtual rig that show an image to each eye.
-  bool refill = true;               ///< Other projectors fill shadows.
-  double extrapolate_s = 0.3;       ///< How long unseen markers are extrapolated.
-  std::string osc;                  ///< PORT or ADDRESS:PORT at which OSC is received; empty: none.
-  std::string osc_from;             ///< The only address whose OSC messages are accepted; empty: all.
-  std::string osc_to;               ///< HOST:PORT to which changes are sent by OSC; empty: none.
-  std::string serve;                ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none.
-  std::string serve_show;           ///< Projector that shows the remote's code at first; empty: none.
+  std::vector<std::string> stereo;     ///< Projectors of the virtual rig that show an image to each eye.
+  bool refill = true;                  ///< Other projectors fill shadows.
+  double extrapolate_s = 0.3;          ///< How long unseen markers are extrapolated.
+  std::string osc;                     ///< PORT or ADDRESS:PORT at which OSC is received; empty: none.
+  std::string osc_from;                ///< The only address whose OSC messages are accepted; empty: all.
+  std::string osc_to;                  ///< HOST:PORT to which changes are sent by OSC; empty: none.
+  std::filesystem::path trackers;      ///< limn.trackers/1: other tracking systems; empty: none.
+  std::vector<std::string> poses_out;  ///< PROTOCOL:HOST:PORT each, to which poses are sent.
+  std::string serve;                   ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none.
+  std::string serve_show;              ///< Projector that shows the remote's code at first; empty: none.
   bool json = false;
 };
 

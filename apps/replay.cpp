@@ -134,11 +134,12 @@ class Recording final : public session::FrameClock, public session::FrameSource 
   }
 
   void queue_frames() {
-    unwatched_.push_back(&next()->at("watch"));
+    unwatched_.push_back(next());
     pass();
   }
 
-  Status watch(const Json& list) {
+  Status watch(const Json& event) {
+    const Json& list = event.at("watch");
     std::vector<Frame> frames;
     for (const Json& item : list) {
       const std::string file = item.at("file"), camera = item.at("camera");
@@ -151,13 +152,13 @@ class Recording final : public session::FrameClock, public session::FrameSource 
       frame.captured_at = stamp_of(item.at("captured_at_ns"));
       frames.push_back(std::move(frame));
     }
-    perception_->watch(frames);
+    perception_->watch(frames, session::recorded_feeds(event));
     ++moments_;
     return {};
   }
 
   Status apply(const Json& event) {
-    if (event.contains("watch")) unwatched_.push_back(&event.at("watch"));
+    if (event.contains("watch")) unwatched_.push_back(&event);
     if (event.contains("scene")) return replace_scene(event.at("scene"));
     if (event.contains("rig")) return replace_rig(event.at("rig"));
     if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
@@ -177,7 +178,7 @@ class Recording final : public session::FrameClock, public session::FrameSource 
     LIMN_TRY(Rig rig, load_rig(path));
     LIMN_TRY_STATUS(session_->replace_rig(std::move(rig), session_->percepts().captured_at));
     const session::SessionSetup& setup = session_->setup();
-    LIMN_TRY(*perception_, session::Perception::create(setup.scene, setup.rig, setup.watch));
+    LIMN_TRY(*perception_, perception_->successor(setup.scene, setup.rig));
     return {};
   }
 

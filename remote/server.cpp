@@ -4,8 +4,8 @@
 
 #include "core/log.h"
 #include "core/user_folder.h"
+#include "device/udp_socket.h"
 #include "remote/http/own_addresses.h"
-#include "session/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -45,7 +45,7 @@ std::string shown_host(const std::string& host) {
 }
 
 Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, const std::string& host) {
-  if (session::is_loopback(host) && !options.always_encrypted) return std::optional<Certificate>();
+  if (device::is_loopback(host) && !options.always_encrypted) return std::optional<Certificate>();
   fs::path keys = options.keys;
   if (keys.empty()) {
     LIMN_TRY(keys, user_folder());
@@ -59,7 +59,7 @@ Result<std::optional<Certificate>> certificate_for(const ServeOptions& options, 
 RequestHandler::Setup Server::handler_setup(const std::string& host,
                                             const std::optional<Certificate>& certificate) {
   return {.authentication = {.is_encrypted = certificate.has_value(),
-                             .is_loopback = session::is_loopback(host),
+                             .is_loopback = device::is_loopback(host),
                              .cookie = fmt::format("limn-{}", network_->port())},
           .authority = certificate ? certificate->authority : "",
           .files = {},
@@ -85,7 +85,7 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   const auto named = [](const Error& problem) {
     return Error{fmt::format("--serve: {}", problem.message), problem.wrong_usage};
   };
-  const auto place = session::net_place(options.at, "127.0.0.1", true);
+  const auto place = device::net_place(options.at, "127.0.0.1", true);
   if (!place) return named(place.error());
   auto files =
       StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);

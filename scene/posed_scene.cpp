@@ -107,7 +107,9 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
   }
   out.viewpoints = fixed_viewpoints(scene);
   for (std::size_t i = 0; i < scene.viewers.size(); ++i)
-    if (const Track* track = scene.viewers[i].marker ? find_track(tracks, viewer_body(i)) : nullptr)
+    if (const Track* track = scene.viewers[i].marker || scene.viewers[i].is_tracked
+                                 ? find_track(tracks, viewer_body(i))
+                                 : nullptr)
       out.viewpoints.push_back(
           {track->body, track->world_from_body * scene.viewers[i].p_eye_marker, scene.viewers[i].weight});
   return out;

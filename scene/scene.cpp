@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -196,18 +197,22 @@ std::string read_tablet(const ConfigNode& node) {
 }
 
 Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
-  node.only({"fixed", "marker", "tablet", "size_mm", "eye_mm", "weight"});
+  node.only({"fixed", "marker", "tracked", "tablet", "size_mm", "eye_mm", "weight"});
   Viewer viewer;
   if (const auto weight = node.find("weight")) viewer.weight = weight->positive();
   if (const auto fixed = node.find("fixed")) viewer.fixed = read_viewer_imager(*fixed);
   if (const auto marker = node.find("marker")) viewer.marker = read_marker_name(*marker);
   if (const auto tablet = node.find("tablet")) viewer.tablet = read_tablet(*tablet);
-  const int kinds = viewer.fixed.has_value() + viewer.marker.has_value() + viewer.tablet.has_value();
+  if (const auto tracked = node.find("tracked")) {
+    viewer.is_tracked = tracked->boolean();
+    if (!viewer.is_tracked) tracked->problem("expected true, or no such key, found false.");
+  }
+  const int kinds =
+      viewer.fixed.has_value() + viewer.marker.has_value() + viewer.is_tracked + viewer.tablet.has_value();
   if (kinds != 1) {
-    node.problem(
-        fmt::format("expected one of \"fixed\", \"marker\" and \"tablet\", found {}.", kinds == 0   ? "none"
-                                                                                       : kinds == 2 ? "two"
-                                                                                                    : "all"));
+    constexpr std::array<const char*, 5> k_found = {"none", "one", "two", "three", "all"};
+    node.problem(fmt::format("expected one of \"fixed\", \"marker\", \"tracked\" and \"tablet\", found {}.",
+                             k_found[static_cast<std::size_t>(kinds)]));
   }
   if (const auto size = node.find("size_mm"))
     viewer.marker_size_m = 1e-3 * size->positive(k_largest_marker_mm);

@@ -61,13 +61,16 @@ struct Control {
 };
 
 /// A viewer that `view` parts are drawn for: a fixed imager, a person's eye relative to a marker (on glasses,
-/// on a cap), or a guest's tablet.
+/// on a cap) or where another tracking system states it, or a guest's tablet.
 struct Viewer {
   double weight = 1;  ///< Weight among several viewers.
   std::optional<Imager> fixed;
   std::optional<MarkerName> marker;
   double marker_size_m = 0;
-  Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();  ///< The eye's position in the marker's frame.
+  /// The viewer has no marker; another tracking system gives its pose (docs/trackers.md).
+  bool is_tracked = false;
+  /// The eye's position in the frame of the marker or of the tracked body.
+  Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();
   /// The guest's name; empty: the tablet of every guest is a viewer.
   std::optional<std::string> tablet = {};
 };

@@ -2,9 +2,9 @@
 
 #include <atomic>
 
+#include "core/latest.h"
 #include "core/log.h"
 #include "session/frame_gate.h"
-#include "session/latest.h"
 
 namespace limn::session {
 namespace {

@@ -12,7 +12,7 @@
 namespace limn::session {
 namespace {
 
-constexpr int k_width = 960;  // largest width of an image, pixels
+constexpr int k_sheet_width = 960;  // largest width of an image, pixels
 
 constexpr const char* k_sheet_style = R"(
 .looks { display: grid; grid-template-columns: repeat(auto-fill, minmax(26rem, 1fr)); gap: 1.6rem; margin-top: 1rem; }
@@ -22,7 +22,7 @@ figure { break-inside: avoid; } figcaption b { display: block; }
 
 std::string image_html(const std::filesystem::path& file, const std::string& name) {
   const auto image = read_image(file);
-  return image ? html_image(*image, k_width, name) : "";
+  return image ? html_image(*image, k_sheet_width, name) : "";
 }
 
 }  // namespace

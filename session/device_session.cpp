@@ -183,7 +183,8 @@ Status play_on_devices(SessionDevices* devices,
   KeyClient keys(devices->keys, parts.session.setup().scene, devices->chosen, health.get());
   note_missing(*devices, health.get(), &parts.output.telemetry());
   SceneFilesClient files(parts.session.setup().scene.folder);
-  PerceptionThread perception(&parts.perception, &cameras, parts.output.recorder(), health.get());
+  PerceptionThread perception(&parts.perception, &cameras, parts.output.recorder(), parts.feeds,
+                              health.get());
   DeviceSource source(seconds, &cameras, &perception);
   DeviceCapture capture(devices, &cameras, &perception, parts.session.setup().rig, is_ended);
   SessionParts with_own = parts;

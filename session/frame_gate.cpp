@@ -22,7 +22,7 @@ std::optional<Frame> FrameGate::taken(Result<Frame> sent, Stamp now) {
     return std::nullopt;
   }
   health_->works(number_);
-  const SourceClock::Time time = clock_.on_session_clock(sent->captured_at, now);
+  const device::SourceClock::Time time = clock_.on_session_clock(sent->captured_at, now);
   if (time.has_stepped)
     health_->note(camera_ + "'s clock has stepped; its images are assumed to have the same delay as before");
   sent->captured_at = time.captured_at;

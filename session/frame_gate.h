@@ -6,8 +6,8 @@
 
 #include "core/frame.h"
 #include "core/result.h"
+#include "device/source_clock.h"
 #include "session/device_health.h"
-#include "session/source_clock.h"
 
 namespace limn::session {
 
@@ -30,7 +30,7 @@ class FrameGate {
   cv::Size size_;
   std::size_t number_;
   DeviceHealth* health_;
-  SourceClock clock_;
+  device::SourceClock clock_;
 };
 
 }  // namespace limn::session

@@ -11,6 +11,7 @@
 #include "session/device_health.h"
 #include "session/frame_input.h"
 #include "session/perception.h"
+#include "session/pose_feeds.h"
 #include "session/recalibration_stage.h"
 #include "session/screen_request.h"
 #include "session/session.h"
@@ -25,6 +26,7 @@ struct SessionParts {
   Session& session;
   SessionOutput& output;
   std::vector<SessionClient*> clients = {};  ///< in the order in which they are called
+  PoseFeeds* feeds = nullptr;                ///< other tracking systems; null: none
 };
 
 /// The clock of a session: the machine's, the virtual rig's, or a recording's.

@@ -34,7 +34,7 @@ Status mend(const Result<wizard::Rechecked>& checked,
   if (checked->result.verdict != calib::RigVerdict::sound) {
     LIMN_TRY_STATUS(session->replace_rig(checked->result.rig, at));
     const SessionSetup& setup = session->setup();
-    LIMN_TRY(*perception, Perception::create(setup.scene, setup.rig, setup.watch));
+    LIMN_TRY(*perception, perception->successor(setup.scene, setup.rig));
   }
   session->warn(at, words_of(checked->result, folder));
   return {};

@@ -3,10 +3,10 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <variant>
 #include <vector>
 
 #include "core/result.h"
+#include "exchange/poses/osc_message.h"
 #include "scene/actions.h"
 
 namespace limn::session {
@@ -34,8 +34,7 @@ constexpr std::size_t k_longest_osc = 1024;
 /// takes, numbers that are not finite, text that is not printable or longer than 200 bytes.
 Result<scene::Edit> edit_of_osc(std::span<const std::uint8_t> datagram);
 
-/// Encodes a message.
-using OscValue = std::variant<int, float, std::string>;
-std::vector<std::uint8_t> osc_message(const std::string& path, const std::vector<OscValue>& arguments);
+using exchange::osc_message;
+using exchange::OscValue;
 
 }  // namespace limn::session

@@ -44,27 +44,27 @@ Result<OscPort> OscPort::open(const std::string& receive_at,
   };
   if (!from.empty() && receive_at.empty())
     return usage_error("--osc-from: expected --osc with it, found none.");
-  const auto sender = numeric_address(from);
+  const auto sender = device::numeric_address(from);
   if (!from.empty() && !sender)
     return usage_error("--osc-from: expected a numeric address such as 192.168.7.20, found '{}'.", from);
   out.from_ = sender.value_or("");
   if (!receive_at.empty()) {
-    const auto place = net_place(receive_at, "127.0.0.1", true);
+    const auto place = device::net_place(receive_at, "127.0.0.1", true);
     if (!place) return named("--osc", place.error());
-    auto socket = UdpSocket::receiving(*place);
+    auto socket = device::UdpSocket::receiving(*place);
     if (!socket) return named("--osc", socket.error());
     out.input_ = std::move(*socket);
     log_info("live: receives OSC at {}, UDP port {}", place->host, out.port());
-    if (from.empty() && !is_loopback(place->host))
+    if (from.empty() && !device::is_loopback(place->host))
       log_warning(
           "live: OSC asks nobody for a PIN: every program that reaches {} can change the session. "
           "--osc-from ADDRESS accepts one machine only.",
           place->host);
   }
   if (!send_to.empty()) {
-    const auto place = net_place(send_to, "127.0.0.1");
+    const auto place = device::net_place(send_to, "127.0.0.1");
     if (!place) return named("--osc-to", place.error());
-    auto socket = UdpSocket::sending(*place);
+    auto socket = device::UdpSocket::sending(*place);
     if (!socket) return named("--osc-to", socket.error());
     out.output_ = std::move(*socket);
   }

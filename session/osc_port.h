@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "core/result.h"
+#include "device/udp_socket.h"
 #include "session/osc.h"
 #include "session/session.h"
 #include "session/session_client.h"
 #include "session/telemetry.h"
-#include "session/udp_socket.h"
 
 namespace limn::session {
 
@@ -49,7 +49,7 @@ class OscPort : public SessionClient {
   void refuse(const std::string& why, Telemetry* telemetry, Stamp at);
   void put(const std::string& key, const std::string& path, std::vector<OscValue> arguments);
 
-  std::optional<UdpSocket> input_, output_;
+  std::optional<device::UdpSocket> input_, output_;
   std::string from_;  // the only accepted sender; empty: all
   std::optional<Stamp> refused_at_;
   std::size_t unreported_ = 0;  // refusals that were not reported yet

@@ -95,12 +95,20 @@ Result<Perception> Perception::create(const scene::Scene& scene,
   out.used_at_.resize(scene.controls.size());
   out.percepts_.frames.resize(rig.cameras.size());
   out.percepts_.detections.resize(rig.cameras.size());
+  for (const tracker::FeedSetup& feed : options.feeds) out.feeds_.emplace_back(feed);
   return out;
 }
 
-const Percepts& Perception::watch(std::span<const Frame> frames) {
+Result<Perception> Perception::successor(const scene::Scene& scene, const Rig& rig) const {
+  LIMN_TRY(Perception next, create(scene, rig, options_));
+  next.feeds_ = feeds_;
+  return next;
+}
+
+const Percepts& Perception::watch(std::span<const Frame> frames, const FeedInput& input) {
   const auto begun = std::chrono::steady_clock::now();
   percepts_.uses.clear();
+  percepts_.feed_notes = input.notes;
   std::vector<std::size_t> cameras;
   for (const Frame& frame : frames) {
     const Imager* camera = find_named(rig_.cameras, frame.camera);
@@ -121,14 +129,45 @@ const Percepts& Perception::watch(std::span<const Frame> frames) {
     for (const Loose& loose : loose_)
       if (loose.moments >= k_known_after)
         bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
-    percepts_.motions =
-        tracker::observed(percepts_.motions, bodies, views, percepts_.captured_at, options_.motion);
+    seen_ = tracker::observed(seen_, bodies, views, percepts_.captured_at, options_.motion);
+  }
+  if (!views.empty() || !input.is_empty()) {
+    percepts_.motions = seen_;
+    if (!feeds_.empty()) follow_feeds(!views.empty(), input);
     percepts_.tracks = tracker::predicted(percepts_.motions, percepts_.captured_at,
                                           tracker::Prediction::filtered, options_.motion);
     follow_loose();
   }
   percepts_.filter_ms = milliseconds_since(filtering);
   return percepts_;
+}
+
+// Combines the cameras' motions with those that other tracking systems state. Their own stays without them,
+// so that a system is registered by what the cameras alone have seen.
+void Perception::follow_feeds(bool has_frames, const FeedInput& input) {
+  Stamp at = percepts_.captured_at;
+  for (const auto& of_feed : input.poses)
+    for (const tracker::ArrivedPose& pose : of_feed) at = std::max(at, pose.arrived_at);
+  if (!has_frames) percepts_.captured_at = at;
+  percepts_.feeds.clear();
+  for (std::size_t i = 0; i < feeds_.size(); ++i) {
+    tracker::ForeignTracker& feed = feeds_[i];
+    if (i < input.poses.size()) feed.receive(input.poses[i]);
+    for (const tracker::BodyFilter& seen : seen_)
+      if (has_frames && seen.measured_at == percepts_.captured_at && seen.images_to_confirm == 0 &&
+          !seen.fixes.empty())
+        feed.add_own(seen.body, seen.fixes.back());
+    feed.update();
+    for (tracker::BodyFilter& motion : feed.motions(at)) {
+      const auto known = std::ranges::find(percepts_.motions, motion.body, &tracker::BodyFilter::body);
+      if (known == percepts_.motions.end())
+        percepts_.motions.push_back(std::move(motion));
+      else
+        *known = tracker::combined(&*known, motion, options_.motion);
+    }
+    for (tracker::FeedStatus& status : feed.statuses(at)) percepts_.feeds.push_back(std::move(status));
+    for (std::string& note : feed.take_notes(at)) percepts_.feed_notes.push_back(std::move(note));
+  }
 }
 
 // Follows known markers near their predicted positions. Searches the whole image for others from time to

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "core/frame.h"
@@ -12,6 +14,7 @@
 #include "scene/scene.h"
 #include "tracker/body_filter.h"
 #include "tracker/detector.h"
+#include "tracker/feeds/foreign_tracker.h"
 #include "tracker/gesture.h"
 
 namespace limn::session {
@@ -36,13 +39,26 @@ struct LooseMarker {
   Stamp still_since;
 };
 
+/// What other tracking systems have sent since the moment before: the poses of each, in the order of
+/// PerceptionOptions::feeds, and messages about what was refused.
+struct FeedInput {
+  std::vector<std::vector<tracker::ArrivedPose>> poses = {};
+  std::vector<std::string> notes = {};
+
+  bool is_empty() const {
+    return std::ranges::all_of(poses, [](const auto& of_feed) { return of_feed.empty(); });
+  }
+};
+
 /// The results of perception after the frames of one moment.
 struct Percepts {
   std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
   std::vector<std::vector<tracker::Detection>> detections;  ///< in these frames, one list per camera
-  std::vector<tracker::BodyFilter> motions;
+  std::vector<tracker::BodyFilter> motions;                 ///< by the cameras and other tracking systems
   std::vector<LooseMarker> loose;  ///< tracked loose markers, the one that is still for longest first
   std::vector<ControlUse> uses;    ///< control uses of this moment
+  std::vector<tracker::FeedStatus> feeds = {};  ///< how far other tracking systems can be used
+  std::vector<std::string> feed_notes = {};     ///< what has changed there, as sentences for people
   Stamp captured_at;
   std::vector<Track> tracks;  ///< filtered tracks at captured_at
   double detect_ms = 0, filter_ms = 0;
@@ -54,7 +70,8 @@ struct PerceptionOptions {
   /// Higher is faster and finds new markers later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
-  int most_loose = 8;  ///< at most so many loose markers; further ones are ignored
+  int most_loose = 8;                          ///< at most so many loose markers; further ones are ignored
+  std::vector<tracker::FeedSetup> feeds = {};  ///< other tracking systems
 };
 
 /// The side that loose markers are assumed to have: that of the scene's first slot, m. 0 without slots: loose
@@ -70,9 +87,13 @@ class Perception {
                                    const Rig& rig,
                                    const PerceptionOptions& options = {});
 
-  /// Processes the frames of one moment, at most one per camera; a camera without a frame keeps its last
-  /// detections. The result stays valid until the next call.
-  const Percepts& watch(std::span<const Frame> frames);
+  /// A perception for another rig of the same session, which keeps what this one knows of other tracking
+  /// systems.
+  Result<Perception> successor(const scene::Scene& scene, const Rig& rig) const;
+
+  /// Processes the frames of one moment, at most one per camera, and what other tracking systems have sent; a
+  /// camera without a frame keeps its last detections. The result stays valid until the next call.
+  const Percepts& watch(std::span<const Frame> frames, const FeedInput& input = {});
   const Percepts& percepts() const { return percepts_; }
 
  private:
@@ -97,6 +118,7 @@ class Perception {
   bool all_are_seen() const;
   void note_loose(std::span<const std::size_t> cameras);
   void follow_loose();
+  void follow_feeds(bool has_frames, const FeedInput& input);
   void read_gestures(std::span<const std::size_t> cameras);
 
   Rig rig_;
@@ -107,6 +129,8 @@ class Perception {
   std::vector<Loose> loose_;
   std::vector<CameraState> camera_states_;  // one per camera
   std::vector<Stamp> used_at_;              // one per control
+  std::vector<tracker::BodyFilter> seen_;   // motions by the cameras alone
+  std::vector<tracker::ForeignTracker> feeds_;
   Percepts percepts_;
 };
 

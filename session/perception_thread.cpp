@@ -13,8 +13,9 @@ constexpr auto k_frames_wait = std::chrono::milliseconds(50);
 PerceptionThread::PerceptionThread(Perception* perception,
                                    CameraThreads* cameras,
                                    Recorder* recorder,
+                                   PoseFeeds* feeds,
                                    DeviceHealth* health)
-    : perception_(perception), cameras_(cameras), recorder_(recorder), health_(health) {
+    : perception_(perception), cameras_(cameras), recorder_(recorder), feeds_(feeds), health_(health) {
   start();
 }
 
@@ -40,15 +41,19 @@ void PerceptionThread::stop() {
 void PerceptionThread::run() try {
   while (!is_stopping_) {
     auto newest = cameras_->take_frames(k_frames_wait);
-    if (!newest) continue;
+    const FeedInput input = feeds_ ? feeds_->received(now(), true) : FeedInput();
+    if (!newest && input.is_empty()) continue;
     std::vector<Frame> frames;
-    for (auto& [name, frame] : *newest) frames.push_back(std::move(frame));
+    if (newest)
+      for (auto& [name, frame] : *newest) frames.push_back(std::move(frame));
     std::sort(frames.begin(), frames.end(),
               [](const Frame& a, const Frame& b) { return a.captured_at < b.captured_at; });
-    if (recorder_) recorder_->record_frames(frames);
-    seen_.put({perception_->watch(frames), ++moments_}, [](const Seen& old, Seen& next) {
+    if (recorder_) recorder_->record_frames(frames, input);
+    seen_.put({perception_->watch(frames, input), ++moments_}, [](const Seen& old, Seen& next) {
       next.percepts.uses.insert(next.percepts.uses.begin(), old.percepts.uses.begin(),
                                 old.percepts.uses.end());
+      next.percepts.feed_notes.insert(next.percepts.feed_notes.begin(), old.percepts.feed_notes.begin(),
+                                      old.percepts.feed_notes.end());
     });
   }
 } catch (const std::exception& bug) {

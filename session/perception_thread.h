@@ -5,10 +5,10 @@
 #include <optional>
 #include <thread>
 
+#include "core/latest.h"
 #include "session/camera_threads.h"
 #include "session/device_health.h"
 #include "session/frame_loop.h"
-#include "session/latest.h"
 #include "session/perception.h"
 #include "session/recording.h"
 
@@ -18,8 +18,12 @@ namespace limn::session {
 /// that were not taken are kept.
 class PerceptionThread {
  public:
-  /// Starts at once. Borrows all arguments; `recorder` may be null.
-  PerceptionThread(Perception* perception, CameraThreads* cameras, Recorder* recorder, DeviceHealth* health);
+  /// Starts at once. Borrows all arguments; `recorder` and `feeds` may be null.
+  PerceptionThread(Perception* perception,
+                   CameraThreads* cameras,
+                   Recorder* recorder,
+                   PoseFeeds* feeds,
+                   DeviceHealth* health);
   ~PerceptionThread() { stop(); }
 
   /// The newest percepts that were not taken yet; waits up to `wait` for them.
@@ -39,6 +43,7 @@ class PerceptionThread {
   Perception* perception_;
   CameraThreads* cameras_;
   Recorder* recorder_;
+  PoseFeeds* feeds_;
   DeviceHealth* health_;
   std::size_t moments_ = 0;  // used by the thread only
   Latest<Seen> seen_;

@@ -34,9 +34,57 @@ Status save_whole_rig(const Rig& rig, const fs::path& folder) {
   return save_responses({rig.responses, rig.camera_responses}, {}, folder);
 }
 
+nlohmann::ordered_json feed_json(const tracker::FeedSetup& feed) {
+  nlohmann::ordered_json json = {{"name", feed.name}, {"delay_s", feed.delay_s}};
+  if (feed.world_from_feed) json["world_from_feed"] = to_json(*feed.world_from_feed);
+  json["bodies"] = nlohmann::ordered_json::array();
+  for (const tracker::FeedBody& body : feed.bodies) {
+    json["bodies"].push_back(
+        {{"sensor", body.sensor}, {"body", body.body}, {"needs_position_only", body.needs_position_only}});
+    if (body.body_from_sensor) json["bodies"].back()["body_from_sensor"] = to_json(*body.body_from_sensor);
+  }
+  return json;
+}
+
+tracker::FeedSetup read_feed_setup(const ConfigNode& node) {
+  node.only({"name", "delay_s", "world_from_feed", "bodies"});
+  tracker::FeedSetup feed{node.at("name").text(), {}, std::nullopt, node.at("delay_s").number()};
+  if (const auto pose = node.find("world_from_feed")) feed.world_from_feed = pose->pose();
+  for (const ConfigNode& item : node.at("bodies").items()) {
+    item.only({"sensor", "body", "needs_position_only", "body_from_sensor"});
+    feed.bodies.push_back({item.at("sensor").text(), item.at("body").text(), std::nullopt,
+                           item.at("needs_position_only").boolean()});
+    if (const auto pose = item.find("body_from_sensor")) feed.bodies.back().body_from_sensor = pose->pose();
+  }
+  return feed;
+}
+
+// A list for each feed. Numbers have all their digits, so that a replay gets the same ones.
+nlohmann::ordered_json feeds_json(const FeedInput& input) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::array();
+  for (const auto& of_feed : input.poses) {
+    json.push_back(nlohmann::ordered_json::array());
+    for (const auto& [pose, arrived_at] : of_feed) {
+      const Eigen::Vector3d& p = pose.feed_from_sensor.translation;
+      const Eigen::Quaterniond& q = pose.feed_from_sensor.rotation;
+      nlohmann::ordered_json item = {{"sensor", pose.sensor}, {"arrived_at_ns", nanoseconds(arrived_at)}};
+      if (pose.is_lost) item["lost"] = true;
+      if (!pose.is_lost) item["p_m"] = {p.x(), p.y(), p.z()};
+      if (!pose.is_lost && pose.has_rotation) item["rotation_wxyz"] = {q.w(), q.x(), q.y(), q.z()};
+      if (pose.time_s) item["time_s"] = *pose.time_s;
+      if (pose.stddev_m) item["stddev_m"] = *pose.stddev_m;
+      if (pose.stddev_rad) item["stddev_rad"] = *pose.stddev_rad;
+      json.back().push_back(std::move(item));
+    }
+  }
+  return json;
+}
+
 nlohmann::ordered_json setup_json(const SessionSetup& setup) {
   const tracker::MotionModel& motion = setup.watch.motion;
   const ComposeOptions& paint = setup.paint;
+  nlohmann::ordered_json feeds = nlohmann::ordered_json::array();
+  for (const tracker::FeedSetup& feed : setup.watch.feeds) feeds.push_back(feed_json(feed));
   return {{"schema", "limn.session/1"},
           {"rig", "rig"},
           {"scene", "scene"},
@@ -57,7 +105,8 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
           {"stereo_mm", paint.stereo_mm},
           {"stereo_projectors", paint.stereo_projectors},
           {"refill", paint.refill},
-          {"screens", setup.screens}};
+          {"screens", setup.screens},
+          {"feeds", feeds}};
 }
 
 }  // namespace
@@ -93,7 +142,7 @@ Result<std::unique_ptr<Recorder>> Recorder::begin(const fs::path& folder, const 
   return out;
 }
 
-void Recorder::record_frames(std::span<const Frame> frames) {
+void Recorder::record_frames(std::span<const Frame> frames, const FeedInput& input) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
   nlohmann::ordered_json event = {{"watch", nlohmann::ordered_json::array()}};
@@ -106,6 +155,7 @@ void Recorder::record_frames(std::span<const Frame> frames) {
     event["watch"].push_back(
         {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
   }
+  if (!input.is_empty()) event["feeds"] = feeds_json(input);
   write(event);
 }
 
@@ -208,6 +258,37 @@ nlohmann::ordered_json pose_log(const ComposedFrame& composed) {
   return json;
 }
 
+FeedInput recorded_feeds(const nlohmann::ordered_json& event) {
+  FeedInput input;
+  if (!event.contains("feeds")) return input;
+  for (const auto& list : event.at("feeds")) {
+    input.poses.emplace_back();
+    for (const auto& item : list) {
+      ForeignPose pose;
+      pose.sensor = item.at("sensor");
+      pose.is_lost = item.value("lost", false);
+      pose.has_rotation = pose.is_lost || item.contains("rotation_wxyz");
+      const auto optional = [&](const char* key, std::optional<double>* to) {
+        if (item.contains(key)) *to = item.at(key).get<double>();
+      };
+      optional("time_s", &pose.time_s);
+      optional("stddev_m", &pose.stddev_m);
+      optional("stddev_rad", &pose.stddev_rad);
+      for (int i = 0; !pose.is_lost && i < 3; ++i)
+        pose.feed_from_sensor.translation[i] = item.at("p_m").at(static_cast<std::size_t>(i)).get<double>();
+      if (!pose.is_lost && pose.has_rotation) {
+        const auto& q = item.at("rotation_wxyz");  // not normalised again: that could change the last digit
+        pose.feed_from_sensor.rotation = {q.at(0).get<double>(), q.at(1).get<double>(), q.at(2).get<double>(),
+                                          q.at(3).get<double>()};
+      }
+      const Stamp arrived_at =
+          Stamp{} + std::chrono::nanoseconds(item.at("arrived_at_ns").get<std::int64_t>());
+      input.poses.back().push_back({std::move(pose), arrived_at});
+    }
+  }
+  return input;
+}
+
 Result<Frame> load_frame(const fs::path& file) {
   Frame frame;
   if (file.extension() != ".jpg") {
@@ -224,7 +305,7 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
-             "label_s", "lost_s", "stereo_mm", "stereo_projectors", "refill", "screens"});
+             "label_s", "lost_s", "stereo_mm", "stereo_projectors", "refill", "screens", "feeds"});
   SessionSetup setup;
   setup.watch.full_scan_every = root.at("full_scan_every").integer();
   if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
@@ -249,6 +330,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   setup.paint.refill = root.at("refill").boolean();
   if (const auto screens = root.find("screens"))
     for (const ConfigNode& name : screens->items()) setup.screens.push_back(name.text());
+  if (const auto feeds = root.find("feeds"))
+    for (const ConfigNode& feed : feeds->items()) setup.watch.feeds.push_back(read_feed_setup(feed));
   const fs::path rig = root.at("rig").path_inside(), scene = root.at("scene").path_inside();
   LIMN_TRY_STATUS(config.status());
   LIMN_TRY(setup.rig, load_rig(rig));

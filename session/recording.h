@@ -40,8 +40,9 @@ class Recorder {
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& folder,
                                                   const SessionSetup& setup);
 
-  /// Records the frames of one moment, as they are passed to Perception::watch.
-  void record_frames(std::span<const Frame> frames);
+  /// Records the frames of one moment and what other tracking systems have sent, as they are passed to
+  /// Perception::watch.
+  void record_frames(std::span<const Frame> frames, const FeedInput& input = {});
   /// To be called when the scene's files have changed: copies them as they are now.
   void record_scene(const scene::Scene& scene);
   /// Records the rig that is used from now on; returns it as a replay will read it, to the last bit.
@@ -81,6 +82,10 @@ std::uint64_t fingerprint(std::span<const cv::Mat> images);
 
 /// The part of a line of events.jsonl that a replay compares: stamps, tracks and parts, with all digits.
 nlohmann::ordered_json pose_log(const ComposedFrame& composed);
+
+/// Reads the poses of other tracking systems in a `watch` event; throws nlohmann::json::exception on a
+/// damaged one.
+FeedInput recorded_feeds(const nlohmann::ordered_json& event);
 
 /// Reads the image of a recorded frame; the camera's name and the stamp are not in the file. Error: the file
 /// is damaged or missing.

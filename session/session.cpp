@@ -74,6 +74,8 @@ void Session::update_percepts(Percepts percepts, std::size_t moments) {
     if (!done) log_warning("live: {}: {}", control.marker.text(), done.message());
   }
   percepts_.uses.clear();
+  for (const std::string& note : percepts_.feed_notes) warn(percepts_.captured_at, note);
+  percepts_.feed_notes.clear();
   const auto swapped =
       swapped_.check(setup_.rig, scene::bodies(setup_.scene), percepts_.detections, percepts_.captured_at);
   if (swapped) warn(percepts_.captured_at, *swapped);

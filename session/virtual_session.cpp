@@ -162,7 +162,7 @@ class EffortControl {
     Session& session = parts_.session;
     LIMN_TRY_STATUS(session.replace_rig(with_sizes(session.setup().rig, sized), rig_->now()));
     const SessionSetup& setup = session.setup();
-    LIMN_TRY(parts_.perception, Perception::create(setup.scene, setup.rig, setup.watch));
+    LIMN_TRY(parts_.perception, parts_.perception.successor(setup.scene, setup.rig));
     rig_->resize(with_sizes(rig_->world().rig, sized));
     return {};
   }
@@ -193,9 +193,11 @@ class VirtualSource final : public FrameSource {
                 ScriptedRoom* room,
                 Perception* perception,
                 Recorder* recorder,
+                PoseFeeds* feeds,
                 DeviceHealth* health)
       : end_s_(end_s),
         control_(control),
+        feeds_(feeds),
         rig_(rig),
         room_(room),
         perception_(perception),
@@ -215,11 +217,12 @@ class VirtualSource final : public FrameSource {
     const std::vector<Frame> frames = exposed();
     Perceived out;
     out.missed = static_cast<int>(rig_->world().rig.cameras.size() - frames.size());
-    if (frames.empty()) return out;
+    const FeedInput input = feeds_ ? feeds_->received(rig_->now(), control_ != nullptr) : FeedInput();
+    if (frames.empty() && input.is_empty()) return out;
     const auto begun = std::chrono::steady_clock::now();
-    if (recorder_) recorder_->record_frames(frames);
+    if (recorder_) recorder_->record_frames(frames, input);
     out.record_ms = milliseconds_since(begun);
-    out.percepts = perception_->watch(frames);
+    out.percepts = perception_->watch(frames, input);
     out.moments = ++moments_;
     return out;
   }
@@ -268,6 +271,7 @@ class VirtualSource final : public FrameSource {
 
   double end_s_;
   EffortControl* control_;  // null: no real time
+  PoseFeeds* feeds_;        // null: none
   sim::VirtualRig* rig_;
   ScriptedRoom* room_;
   Perception* perception_;
@@ -360,7 +364,8 @@ Status play(double end_s,
   std::optional<EffortControl> control;
   if (real_time) control.emplace(*real_time, rig, parts);
   EffortControl* const kept = control ? &*control : nullptr;
-  VirtualSource source(end_s, kept, rig, room, &parts.perception, parts.output.recorder(), &health);
+  VirtualSource source(end_s, kept, rig, room, &parts.perception, parts.output.recorder(), parts.feeds,
+                       &health);
   VirtualSink sink(rig, room, &parts.session, &health, kept);
   VirtualCapture capture(rig, &source);
   SceneFilesClient files(parts.session.setup().scene.folder);

@@ -84,8 +84,7 @@ Branch started(const PoseFit& fit) {
 }
 
 std::optional<PoseFit> posterior(const BodyEvidence& seen, const Motion& prior, const Pose& start) {
-  const PosePrior known = prior_of(prior);
-  return fit_pose(seen.points_at(start).observations, start, k_huber, &known);
+  return seen.posterior(prior_of(prior), start);
 }
 
 // A branch, predicted to the time of the new images.
@@ -288,6 +287,10 @@ BodyFilter seen_again(const BodyFilter& known,
 }
 
 }  // namespace
+
+std::optional<PoseFit> BodyEvidence::posterior(const PosePrior& prior, const Pose& start) const {
+  return fit_pose(points_at(start).observations, start, k_huber, &prior);
+}
 
 double lost_after_s(const BodyFilter& motion, const MotionModel& model) {
   constexpr double k_gaps = 1.5;

@@ -78,6 +78,8 @@ double lost_after_s(const BodyFilter& motion, const MotionModel& model);
 class BodyEvidence {
  public:
   virtual ~BodyEvidence() = default;
+  /// The mode of the pose's posterior near `start`; nullopt: there is none. By default from points_at().
+  virtual std::optional<PoseFit> posterior(const PosePrior& prior, const Pose& start) const;
   /// The points that the body's pose is computed from, as chosen for this pose.
   virtual ChosenCorners points_at(const Pose& world_from_body) const = 0;
   /// Squared normalised residuals of what else tells poses apart (the sizes of balls); 0 for markers.

@@ -74,6 +74,14 @@ Motion moved(const Motion& motion, const Eigen::Matrix<double, 18, 1>& delta) {
   return out;
 }
 
+// What moves `from` to `to`.
+Eigen::Matrix<double, 18, 1> difference(const Motion& to, const Motion& from) {
+  Eigen::Matrix<double, 18, 1> delta;
+  delta << boxminus(to.world_from_body, from.world_from_body), to.velocity - from.velocity,
+      to.acceleration - from.acceleration;
+  return delta;
+}
+
 double log_determinant(const Matrix6d& m) {
   return 2 * Eigen::LLT<Matrix6d>(m).matrixL().toDenseMatrix().diagonal().array().log().sum();
 }
@@ -112,10 +120,18 @@ Motion corrected(const Motion& motion, const PoseFit& fit) {
   return after;
 }
 
+Motion combined(const Motion& a, const Motion& b) {
+  constexpr double k_least_variance =
+      1e-16;  // where both are certain, such as the velocity of what stands still
+  const Matrix18d sum = a.covariance + b.covariance + k_least_variance * Matrix18d::Identity();
+  const Matrix18d gain = sum.llt().solve(a.covariance).transpose();
+  Motion out = moved(a, gain * difference(b, a));
+  out.covariance = symmetric(a.covariance - gain * a.covariance);
+  return out;
+}
+
 Motion mixed(const Motion& a, double weight_a, const Motion& b, double weight_b) {
-  Eigen::Matrix<double, 18, 1> apart;
-  apart << boxminus(b.world_from_body, a.world_from_body), b.velocity - a.velocity,
-      b.acceleration - a.acceleration;
+  const Eigen::Matrix<double, 18, 1> apart = difference(b, a);
   Motion out = moved(a, weight_b * apart);
   out.covariance =
       weight_a * a.covariance + weight_b * b.covariance + weight_a * weight_b * apart * apart.transpose();

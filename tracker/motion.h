@@ -45,6 +45,9 @@ PosePrior prior_of(const Motion& motion);
 /// A single Gaussian with mean and covariance of the weighted mixture of two; the weights add up to 1.
 Motion mixed(const Motion& a, double weight_a, const Motion& b, double weight_b);
 
+/// The motion by two estimates of it at one moment whose errors are independent.
+Motion combined(const Motion& a, const Motion& b);
+
 /// Log likelihood of the measurement, except for a constant that all motions share: Laplace's approximation
 /// of the integral over the pose, from the cost and width of the posterior.
 double log_evidence(const Motion& prior, const PoseFit& fit);

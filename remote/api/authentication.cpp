@@ -3,17 +3,17 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json_text.h"
+#include "device/udp_socket.h"
 #include "remote/api/messages.h"
 #include "remote/api/responses.h"
 #include "remote/http/own_addresses.h"
-#include "session/udp_socket.h"
 
 namespace limn::remote {
 
 std::optional<HttpResponse> Authentication::check_origin(const HttpRequest& request) const {
   const std::string host = host_in(request.host);
   if (host.empty()) return error_response(k_http_bad_request, "expected a Host header, found none.");
-  if (setup_.is_loopback && host != "localhost" && !session::is_loopback(host))
+  if (setup_.is_loopback && host != "localhost" && !device::is_loopback(host))
     return error_response(k_http_forbidden,
                           "expected localhost or 127.0.0.1 as the host, found another name.");
   if (!request.origin.empty() &&

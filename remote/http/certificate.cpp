@@ -20,8 +20,8 @@
 #include <optional>
 
 #include "core/file.h"
+#include "device/udp_socket.h"
 #include "remote/http/own_addresses.h"
-#include "session/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -58,7 +58,7 @@ struct Pair {
 };
 
 bool is_for(X509* certificate, const std::string& host) {
-  return session::numeric_address(host)
+  return device::numeric_address(host)
              ? X509_check_ip_asc(certificate, host.c_str(), 0) == 1
              : X509_check_host(certificate, host.data(), host.size(), 0, nullptr) == 1;
 }
@@ -95,7 +95,7 @@ std::string alternative_names(const std::vector<std::string>& hosts) {
   std::string names;
   for (const std::string& host : hosts)
     names +=
-        fmt::format("{}{}:{}", names.empty() ? "" : ",", session::numeric_address(host) ? "IP" : "DNS", host);
+        fmt::format("{}{}:{}", names.empty() ? "" : ",", device::numeric_address(host) ? "IP" : "DNS", host);
   return names;
 }
 
@@ -103,7 +103,7 @@ std::string permitted_names(const std::vector<std::string>& hosts) {
   std::string names = k_permitted;
   for (const std::string& host : hosts) {
     const bool is_v6 = host.find(':') != std::string::npos;
-    names += session::numeric_address(host)
+    names += device::numeric_address(host)
                  ? fmt::format(",permitted;IP:{}/{}", host,
                                is_v6 ? "ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff" : "255.255.255.255")
                  : fmt::format(",permitted;DNS:{}", host);

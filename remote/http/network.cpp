@@ -15,8 +15,8 @@
 
 #include "core/log.h"
 #include "core/worker_thread.h"
+#include "device/udp_socket.h"
 #include "remote/http/own_addresses.h"
-#include "session/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -88,7 +88,7 @@ class ConnectionSlots {
   // Null: there is no slot left, not even for an answer that says so.
   std::unique_ptr<Slot> acquire(const std::string& address) {
     const bool is_over_limit =
-        !session::is_loopback(address) && connections_of(address) >= static_cast<int>(limits_.per_address);
+        !device::is_loopback(address) && connections_of(address) >= static_cast<int>(limits_.per_address);
     if (!is_over_limit && (has_room() || evict_for(address)))
       return std::make_unique<Slot>(this, address, Kind::served);
     if (rejected_ >= static_cast<int>(limits_.rejected)) return nullptr;
@@ -543,7 +543,7 @@ struct Network::Impl {
 
 Network::Network(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<Network>> Network::open(const session::NetPlace& place,
+Result<std::unique_ptr<Network>> Network::open(const device::NetPlace& place,
                                                const std::optional<Certificate>& certificate,
                                                const NetworkLimits& limits) {
   auto impl = std::make_unique<Impl>(limits);

@@ -7,9 +7,9 @@
 #include <string>
 
 #include "core/result.h"
+#include "device/udp_socket.h"
 #include "remote/http/certificate.h"
 #include "remote/http/http_handler.h"
-#include "session/udp_socket.h"
 
 namespace limn::remote {
 
@@ -34,7 +34,7 @@ class Network {
  public:
   /// Binds the port. With a certificate only TLS is accepted. Errors: the address is not this machine's, or
   /// the port is in use. No request is answered before start().
-  static Result<std::unique_ptr<Network>> open(const session::NetPlace& place,
+  static Result<std::unique_ptr<Network>> open(const device::NetPlace& place,
                                                const std::optional<Certificate>& certificate,
                                                const NetworkLimits& limits = {});
   ~Network();

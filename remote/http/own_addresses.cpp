@@ -9,7 +9,7 @@
 #include <array>
 #include <memory>
 
-#include "session/udp_socket.h"
+#include "device/udp_socket.h"
 
 namespace limn::remote {
 namespace {
@@ -49,7 +49,7 @@ std::vector<std::string> own_addresses() {
     if (!at->ifa_addr || (at->ifa_addr->sa_family != AF_INET && at->ifa_addr->sa_family != AF_INET6))
       continue;
     const std::string address = text_of(*at->ifa_addr);
-    if (address.empty() || session::is_loopback(address) || is_link_local(address)) continue;
+    if (address.empty() || device::is_loopback(address) || is_link_local(address)) continue;
     if (std::find(out.begin(), out.end(), address) == out.end()) out.push_back(address);
   }
   std::stable_partition(out.begin(), out.end(),

@@ -28,7 +28,7 @@
 #include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
-#include "session/latest.h"
+#include "core/latest.h"
 #include "session/perception.h"
 #include "session/recording.h"
 #include "session/script.h"
@@ -157,8 +157,8 @@ void print_cost(const std::vector<Shot>& shots, const SessionSetup& setup, const
   const std::string family = "apriltag_36h11";
   const Peer apriltag = apriltag_peer(std::span(&family, 1), 2, 1);
   auto perception = Perception::create(setup.scene, setup.rig, setup.watch).value();
-  session::Latest<std::vector<Frame>> frames;
-  session::Latest<Percepts> seen;
+  Latest<std::vector<Frame>> frames;
+  Latest<Percepts> seen;
   std::vector<double> decode, watch, filter, hand, theirs;
   std::size_t markers = 0;
   std::vector<std::function<Frame()>> decoders;

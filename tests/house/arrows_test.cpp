@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using Names = std::set<std::string>;
 
-// Each room and the rooms that it may include. exchange/printing counts as a room.
+// Each room and the rooms that it may include. exchange/poses and exchange/printing count as rooms.
 const std::map<std::string, Names>& allowed() {
   static const Names k_libraries = {"core", "scene", "device", "calib", "tracker", "projector", "sim"};
   static const auto with = [](const Names& more) {
@@ -40,10 +40,11 @@ const std::map<std::string, Names>& allowed() {
       {"sim", {"core", "scene", "device"}},
       {"gui", {"core", "device"}},
       {"exchange", {"core", "scene", "projector"}},
+      {"exchange/poses", {"core"}},
       {"exchange/printing", {"core", "calib", "tracker"}},
       {"design", {"core", "calib", "tracker"}},
       {"wizard", with({"gui"})},
-      {"session", with({"gui", "wizard"})},
+      {"session", with({"gui", "exchange/poses", "wizard"})},
       {"remote", with({"gui", "session"})},
       {"validate", with({"wizard", "session"})},
       {"apps",
@@ -92,7 +93,7 @@ const std::map<std::string, Names>& guests() {
       {"tiffio", {"core"}},
       {"webp/", {"core"}},
       {"zip.h", {"scene", "exchange"}},
-      {"lo/", {"session"}},
+      {"lo/", {"exchange/poses"}},
       {"pugixml", {"core", "scene", "exchange"}},
       {"yaml-cpp/", {"core"}},
       {"OpenEXR/", {"exchange"}},

@@ -19,9 +19,9 @@
 #include "remote/server.h"
 #include "session/camera_threads.h"
 #include "session/device_session.h"
-#include "session/latest.h"
+#include "core/latest.h"
 #include "session/live_recalibration.h"
-#include "session/source_clock.h"
+#include "device/source_clock.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/remote_client.h"
 #include "tests/support/clicker.h"
@@ -80,7 +80,7 @@ class LooseCamera : public device::CameraSource {
 };
 
 TEST(Latest, TheNewestWinsAndNothingQueues) {
-  session::Latest<int> box;
+  Latest<int> box;
   EXPECT_FALSE(box.take_newest(std::chrono::milliseconds(1)));
   std::thread writer([&] {
     for (int i = 1; i <= 1000; ++i) box.put(i);
@@ -95,7 +95,7 @@ TEST(Latest, TheNewestWinsAndNothingQueues) {
 
 TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
   const Stamp begun = shifted(Stamp{}, 5000);
-  session::SourceClock own;  // the session's clock, 30 ms on the way
+  device::SourceClock own;  // the session's clock, 30 ms on the way
   for (int i = 0; i < 5; ++i) {
     const Stamp now = shifted(begun, 0.1 * i);
     const auto time = own.on_session_clock(shifted(now, -0.03), now);
@@ -111,7 +111,7 @@ TEST(SourceClock, StampsComeOntoTheSessionsClockAlsoWhenTheirClockSteps) {
     EXPECT_FALSE(next.has_stepped);
     EXPECT_NEAR(seconds_between(next.captured_at, shifted(begun, 1.1)), 0.03, 1e-6);
   }
-  session::SourceClock video;
+  device::SourceClock video;
   EXPECT_EQ(video.on_session_clock(Stamp{}, begun).captured_at, begun);
   EXPECT_TRUE(video.is_other());
 }

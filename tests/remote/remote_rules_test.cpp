@@ -16,7 +16,7 @@
 #include "remote/http/http.h"
 #include "remote/http/own_addresses.h"
 #include "remote/http/static_files.h"
-#include "session/udp_socket.h"
+#include "device/udp_socket.h"
 #include "tests/support/matchers.h"
 
 namespace limn::remote {
@@ -389,9 +389,9 @@ TEST(Http, PartsOfPathsAreDecodedOnce) {
 }
 
 TEST(OwnAddresses, KnowWhoCanReachThem) {
-  for (const char* own : {"127.0.0.1", "127.3.2.1", "::1"}) EXPECT_TRUE(session::is_loopback(own)) << own;
+  for (const char* own : {"127.0.0.1", "127.3.2.1", "::1"}) EXPECT_TRUE(device::is_loopback(own)) << own;
   for (const char* other : {"0.0.0.0", "192.168.7.2", "::", "128.0.0.1", "localhost", "127.0.0.1.example"})
-    EXPECT_FALSE(session::is_loopback(other)) << other;
+    EXPECT_FALSE(device::is_loopback(other)) << other;
   EXPECT_TRUE(is_unspecified("0.0.0.0"));
   EXPECT_TRUE(is_unspecified("::"));
 }

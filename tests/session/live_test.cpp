@@ -25,7 +25,7 @@
 #include "session/session.h"
 #include "session/swapped_cameras.h"
 #include "session/telemetry.h"
-#include "session/udp_socket.h"
+#include "device/udp_socket.h"
 #include "session/virtual_room.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
@@ -157,7 +157,7 @@ TEST(Live, GoesOnWithAMendedRig) {
 // Edits of another program come at any moment; they are recorded and replayed at the same moment.
 TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   const fs::path folder = test::test_folder();
-  auto answers = UdpSocket::receiving({"127.0.0.1", "0"});
+  auto answers = device::UdpSocket::receiving({"127.0.0.1", "0"});
   ASSERT_TRUE(answers) << answers.message();
   copy_studio_to(folder);
   apps::LiveOptions options;
@@ -170,7 +170,7 @@ TEST(Live, HearsAndTellsByOscAndIsReplayed) {
   options.out = folder / "out";
   bool was_answered = false;
   std::thread other([&] {
-    auto sender = UdpSocket::sending({"127.0.0.1", "47312"});
+    auto sender = device::UdpSocket::sending({"127.0.0.1", "47312"});
     const auto has_answered = [&](const std::string& wanted) {
       std::array<std::uint8_t, 2048> bytes{};
       while (const auto datagram = answers->next(bytes))

@@ -1,4 +1,4 @@
-#include "session/udp_socket.h"
+#include "device/udp_socket.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -7,14 +7,16 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <string_view>
 #include <utility>
 
-namespace limn::session {
+namespace limn::device {
 namespace {
 
 constexpr std::string_view k_ipv4_as_ipv6 = "::ffff:";
@@ -40,8 +42,38 @@ Result<Addresses> addresses_of(const NetPlace& place, int flags) {
 int open_for(const addrinfo& address) {
   const int handle = socket(address.ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const int yes = 1;
-  if (handle >= 0) setsockopt(handle, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+  if (handle < 0) return handle;
+  setsockopt(handle, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+  setsockopt(handle, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
   return handle;
+}
+
+bool is_multicast(const addrinfo& address) {
+  return address.ai_family == AF_INET &&
+         IN_MULTICAST(ntohl(reinterpret_cast<const sockaddr_in*>(address.ai_addr)->sin_addr.s_addr));
+}
+
+// Joins the group on the interface that the system chooses, and lets other programs use its port.
+bool join(int handle, const addrinfo& address) {
+  const int yes = 1;
+  ip_mreq group = {};
+  group.imr_multiaddr = reinterpret_cast<const sockaddr_in*>(address.ai_addr)->sin_addr;
+  return setsockopt(handle, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes) == 0 &&
+         setsockopt(handle, IPPROTO_IP, IP_ADD_MEMBERSHIP, &group, sizeof group) == 0;
+}
+
+// Seconds since the system received the datagram; 0 where it does not say so.
+double age_of(const msghdr& message) {
+  for (const cmsghdr* part = CMSG_FIRSTHDR(&message); part;
+       part = CMSG_NXTHDR(const_cast<msghdr*>(&message), const_cast<cmsghdr*>(part))) {
+    if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != SCM_TIMESTAMPNS) continue;
+    timespec received = {}, now = {};
+    std::memcpy(&received, CMSG_DATA(part), sizeof received);
+    clock_gettime(CLOCK_REALTIME, &now);
+    return std::max(0.0, static_cast<double>(now.tv_sec - received.tv_sec) +
+                             1e-9 * static_cast<double>(now.tv_nsec - received.tv_nsec));
+  }
+  return 0;
 }
 
 }  // namespace
@@ -83,6 +115,10 @@ bool is_loopback(const std::string& address) {
 Result<UdpSocket> UdpSocket::receiving(const NetPlace& place) {
   LIMN_TRY(const Addresses addresses, addresses_of(place, AI_NUMERICHOST | AI_PASSIVE));
   UdpSocket out(open_for(*addresses));
+  if (out.handle_ >= 0 && is_multicast(*addresses) && !join(out.handle_, *addresses))
+    return error(
+        "{}:{}: expected a multicast group that this machine can join, found: {}. Check its network.",
+        place.host, place.port, std::strerror(errno));
   if (out.handle_ < 0 || bind(out.handle_, addresses->ai_addr, addresses->ai_addrlen) != 0)
     return error("{}:{}: expected a free port at an address of this machine, found: {}. Take another port.",
                  place.host, place.port, std::strerror(errno));
@@ -109,15 +145,24 @@ UdpSocket::~UdpSocket() {
 
 std::optional<Datagram> UdpSocket::next(std::span<std::uint8_t> bytes) {
   sockaddr_storage sender = {};
-  socklen_t size = sizeof sender;
-  auto* const address = reinterpret_cast<sockaddr*>(&sender);
-  const ssize_t length = recvfrom(handle_, bytes.data(), bytes.size(), MSG_TRUNC, address, &size);
+  alignas(cmsghdr) char control[CMSG_SPACE(sizeof(timespec))] = {};
+  iovec buffer = {bytes.data(), bytes.size()};
+  msghdr message = {};
+  message.msg_name = &sender;
+  message.msg_namelen = sizeof sender;
+  message.msg_iov = &buffer;
+  message.msg_iovlen = 1;
+  message.msg_control = control;
+  message.msg_controllen = sizeof control;
+  const ssize_t length = recvmsg(handle_, &message, MSG_TRUNC);
   if (length < 0) return std::nullopt;
+  const auto* const address = reinterpret_cast<const sockaddr*>(&sender);
   char host[NI_MAXHOST] = "";
-  static_cast<void>(getnameinfo(address, size, host, sizeof host, nullptr, 0, NI_NUMERICHOST));
+  static_cast<void>(getnameinfo(address, message.msg_namelen, host, sizeof host, nullptr, 0, NI_NUMERICHOST));
   const std::string_view from = host;
   return Datagram{static_cast<std::size_t>(length),
-                  std::string(from.starts_with(k_ipv4_as_ipv6) ? from.substr(k_ipv4_as_ipv6.size()) : from)};
+                  std::string(from.starts_with(k_ipv4_as_ipv6) ? from.substr(k_ipv4_as_ipv6.size()) : from),
+                  age_of(message)};
 }
 
 void UdpSocket::send(std::span<const std::uint8_t> bytes) {
@@ -134,4 +179,4 @@ int UdpSocket::port() const {
                                              : reinterpret_cast<const sockaddr_in&>(address).sin_port);
 }
 
-}  // namespace limn::session
+}  // namespace limn::device

@@ -5,8 +5,9 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <utility>
 
-namespace limn::session {
+namespace limn {
 
 /// Passes one value between threads: a new value replaces the old one, nothing is queued.
 template <class T>
@@ -35,4 +36,4 @@ class Latest {
   std::optional<T> value_;
 };
 
-}  // namespace limn::session
+}  // namespace limn

@@ -5,7 +5,7 @@
 
 #include "core/frame.h"
 
-namespace limn::session {
+namespace limn::device {
 
 /// Converts a camera's stamps to the session's clock. Stamps of another clock (a video's, or a camera clock
 /// that is set wrong) are shifted so that the first one is now. When a clock steps, the shift is chosen again
@@ -37,4 +37,4 @@ class SourceClock {
   double behind_s_ = 0;  // delay of the newest stamp that fitted
 };
 
-}  // namespace limn::session
+}  // namespace limn::device

@@ -8,7 +8,7 @@
 
 #include "core/result.h"
 
-namespace limn::session {
+namespace limn::device {
 
 /// "ADDRESS:PORT"; an IPv6 address stands in brackets.
 struct NetPlace {
@@ -27,13 +27,15 @@ bool is_loopback(const std::string& address);
 struct Datagram {
   std::size_t length = 0;  ///< The whole datagram's, also when it was cut off.
   std::string from;        ///< The sender's numeric address, IPv4 where it has one.
+  double age_s = 0;        ///< How long it has waited in the system's buffer.
 };
 
 /// A UDP socket that never waits.
 class UdpSocket {
  public:
-  /// Opens a socket that receives at a numeric address of this machine. Error: this machine has no such
-  /// address, or the port is in use.
+  /// Opens a socket that receives at a numeric address of this machine, or as a member of an IPv4 multicast
+  /// group (224.0.0.0 to 239.255.255.255), whose port others may use too. Error: this machine has no such
+  /// address, the port is in use, or the group cannot be joined.
   static Result<UdpSocket> receiving(const NetPlace& place);
   /// Opens a socket that sends to a host. Error: the host has no address.
   static Result<UdpSocket> sending(const NetPlace& place);
@@ -53,4 +55,4 @@ class UdpSocket {
   int handle_ = -1;
 };
 
-}  // namespace limn::session
+}  // namespace limn::device
