@@ -2,7 +2,7 @@
 (() => {
   const native_frame = window.requestAnimationFrame.bind(window);
   let path = null, // of web_glasses_room
-    begun_unix_s = Infinity,
+    walk = { at_unix_s: Infinity, from_s: 0, until_s: 0 },
     xr = null,
     layer = null,
     gl = null;
@@ -15,7 +15,8 @@
   // Where the odometry believes the head to be.
   const move_to = (unix_s) => {
     if (!path) return;
-    const at = Math.min(Math.max((unix_s - begun_unix_s) / path.step_s, 0), path.poses.length - 1.001) || 0,
+    const at_s = Math.min(Math.max(unix_s - walk.at_unix_s + walk.from_s, walk.from_s), walk.until_s);
+    const at = Math.min(at_s / path.step_s, path.poses.length - 1.001),
       i = Math.floor(at),
       share = at - i;
     const [a, b] = [path.poses[i], path.poses[i + 1]],
@@ -77,9 +78,9 @@
   window.limn_glasses = {
     device,
     places,
-    begin(given, at_unix_s) {
+    walk_on(given, at_unix_s, from_s, until_s) {
       path = given;
-      begun_unix_s = at_unix_s;
+      walk = { at_unix_s, from_s, until_s };
     },
     traffic: () => ({ ...traffic }),
 

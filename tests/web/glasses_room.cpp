@@ -1,7 +1,7 @@
 // web_glasses_room FOLDER: a session of the studio, served to a page with emulated glasses (glasses_test.py).
 // A person wears them; the room's cameras measure their marker, and FOLDER/path.json says where their
 // drifting odometry believes them to be. Commands come by the standard input, a line each:
-//   begin UNIX_S              the person begins to look round
+//   walk UNIX_S FROM UNTIL    the walk is at FROM (s) at that time, goes on to UNTIL, and stays there
 //   station INDEX X           the pose of an eye at a station
 //   mask SIZE… EYE… POSE…     which pixels of an eye parts and light cover (see mask_of)
 //   projected                 a number that changes with the projectors' images
@@ -42,7 +42,7 @@ using nlohmann::json;
 
 constexpr const char* k_marker = "apriltag_36h11:40";
 constexpr double k_degree = std::numbers::pi / 180;
-constexpr double k_step_s = 0.01, k_look_round_s = 12, k_station_s = 6, k_move_s = 1;
+constexpr double k_step_s = 0.01, k_look_round_s = 12, k_station_s = 3, k_move_s = 1;
 constexpr int k_stations = 3;
 constexpr double k_marker_rad = 2e-3, k_marker_m = 0.5e-3;
 constexpr double k_drift_rad = 0.02 * k_degree, k_drift_m = 0.3e-3;  // in a second
@@ -136,6 +136,12 @@ json path_of(const Walk& walk) {
   return out;
 }
 
+// Which part of the walk is walked.
+struct Walking {
+  double begun_unix_s = 0, from_s = 0, until_s = 0;
+  double at_s() const { return std::clamp(unix_s() - begun_unix_s, from_s, until_s); }
+};
+
 class Room {
  public:
   explicit Room(const fs::path& folder) : context_(device::GlContext::create().value()) {
@@ -175,7 +181,9 @@ class Room {
     return {{"url", invited.url}, {"pins", invited.pins}, {"projected", projected()}};
   }
 
-  void begin(double at_unix_s) { begun_unix_s_ = at_unix_s; }
+  void walk_on(double at_unix_s, double from_s, double until_s) {
+    walking_ = {at_unix_s - from_s, from_s, until_s};
+  }
   void show_marker(bool is_shown) { is_marker_shown_ = is_shown; }
 
   // One turn of the session, a hundred times a second; the marker is measured thirty times a second.
@@ -185,7 +193,7 @@ class Room {
       measured_at_ = now;
       Track track;
       track.body = scene::viewer_body(setup_.scene.viewers.size() - 1);
-      track.world_from_body = boxplus(walk_.eye(unix_s() - begun_unix_s_) * marker_from_eye_.inverse(),
+      track.world_from_body = boxplus(walk_.eye(walking_.at_s()) * marker_from_eye_.inverse(),
                                       noise(rng_, k_marker_rad, k_marker_m));
       track.covariance.diagonal() << Vector3d::Constant(k_marker_rad * k_marker_rad),
           Vector3d::Constant(k_marker_m * k_marker_m);
@@ -269,7 +277,7 @@ class Room {
   std::size_t moments_ = 0;
   Walk walk_;
   Pose marker_from_eye_{exp_rotation({0.4, 1.2, -0.3}), {0.03, -0.07, 0.05}};
-  double begun_unix_s_ = 1e18;
+  Walking walking_;
   bool is_marker_shown_ = true;
   Stamp measured_at_;
   std::unique_ptr<remote::Server> server_;
@@ -309,11 +317,14 @@ json done_by(Room* room, const std::string& line) {
   if (command == "mask") return room->mask_of(words);
   if (command == "station") return room->station_of(words);
   if (command == "projected") return room->projected_again();
-  words >> value;
-  if (command == "begin")
-    room->begin(std::stod(value));
-  else if (command == "marker")
+  if (command == "walk") {
+    double at_unix_s = 0, from_s = 0, until_s = 0;
+    words >> at_unix_s >> from_s >> until_s;
+    room->walk_on(at_unix_s, from_s, until_s);
+  } else if (command == "marker") {
+    words >> value;
     room->show_marker(value == "on");
+  }
   return {{"done", command}};
 }
 
