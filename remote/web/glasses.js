@@ -159,10 +159,12 @@ class Glasses {
 
   #draw(time, frame) {
     const pose = frame.getViewerPose(this.#space);
-    const is_tracking = Boolean(pose) && !pose.emulatedPosition;
+    // Some browsers give frames to a hidden session, too.
+    const is_hidden = this.#xr.visibilityState === "hidden";
+    const is_tracking = Boolean(pose) && !pose.emulatedPosition && !is_hidden;
     if (is_tracking !== this.#is_tracking) {
       this.#is_tracking = is_tracking;
-      if (!is_tracking) this.#report("lost");
+      if (!is_tracking) this.#report(is_hidden ? "asleep" : "lost");
       this.on_change();
     }
     if (is_tracking && time - this.#sent_at >= k_pose_interval_ms) {
