@@ -19,8 +19,9 @@ constexpr double k_degree = std::numbers::pi / 180;
 constexpr double k_kept_s = 12;               // poses, and markers that the filter starts from
 constexpr double k_least_interval_s = 0.015;  // between two poses; nearer ones are a flood and left out
 constexpr double k_gap_s = 0.25;              // longer gaps between poses are not interpolated
-constexpr double k_silent_s = 1;              // without poses for so long the glasses are lost
-constexpr double k_unseen_s = 3;              // without the marker for so long it is reported
+constexpr double k_rest_gap_s = 0.8, k_rest_m = 1e-3, k_rest_rad = 0.2 * k_degree;
+constexpr double k_silent_s = 1;  // without poses for so long the glasses are lost
+constexpr double k_unseen_s = 3;  // without the marker for so long it is reported
 constexpr double k_clock_jump_s = 1;
 constexpr double k_unit_tolerance = 0.02, k_farthest_m = 1000;
 constexpr double k_start_interval_s = 0.25;  // between two attempts to start the filter
@@ -47,6 +48,17 @@ Matrix6d diagonal(double rotation, double translation) {
 
 double largest_deviation(const Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Matrix3d>(covariance).eigenvalues()[2]));
+}
+
+bool has_moved(const Pose& from, const Pose& to, double most_m, double most_rad) {
+  return (to.translation - from.translation).norm() > most_m ||
+         angle_between(from.rotation, to.rotation) > most_rad;
+}
+
+// Whether a head at rest is where it was between two poses that are too far apart to interpolate motion.
+bool is_at_rest(const OdometryPose& from, const OdometryPose& to) {
+  return to.at_s - from.at_s <= k_rest_gap_s &&
+         !has_moved(from.feed_from_eye, to.feed_from_eye, k_rest_m, k_rest_rad);
 }
 
 bool has_jumped(const Pose& from, const Pose& to, double seconds) {
@@ -161,6 +173,10 @@ std::optional<GlassesRegistration::Moving> GlassesRegistration::eye_at(double pa
   const auto at = [&](int k) -> const OdometryPose& {
     return eyes_[static_cast<std::size_t>(index - 2 + k)];
   };
+  if (at(2).at_s - at(1).at_s > k_gap_s) {
+    if (!is_at_rest(at(1), at(2))) return std::nullopt;
+    return Moving{at(1).feed_from_eye, Vector6d::Zero()};
+  }
   Vector6d delta = Vector6d::Zero(), speed = Vector6d::Zero();
   for (int k = 0; k < 4; ++k) {
     if (k > 0 && at(k).at_s - at(k - 1).at_s > k_gap_s) return std::nullopt;
@@ -183,9 +199,7 @@ bool GlassesRegistration::is_new_place(const MeasuredMarker& marker, const Pose&
   if (!last_marker_ || !last_eye_) return true;
   const double seconds = marker.at_s - last_marker_->at_s;
   if (seconds < k_pair_interval_s) return false;
-  const bool has_moved = (feed_from_eye.translation - last_eye_->translation).norm() > k_moved_m ||
-                         angle_between(feed_from_eye.rotation, last_eye_->rotation) > k_moved_rad;
-  return has_moved || seconds > k_still_interval_s;
+  return has_moved(*last_eye_, feed_from_eye, k_moved_m, k_moved_rad) || seconds > k_still_interval_s;
 }
 
 // Adds the drift since the filter's moment. The odometry turns about the head.

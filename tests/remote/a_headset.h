@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -48,9 +49,11 @@ class Headset {
   // What the person does; 0: stands still.
   double turn_rad = 0.6, nod_rad = 0.4, roll_rad = 0.15, walk_m = 0.15;
   bool is_marker_seen = true, sends_poses = true;
+  int pose_every = 4;                                    // steps of 1/120 s
   double drift_rad = 0.02 * k_degree, drift_m = 0.3e-3;  // in a second, as a random walk
 
   Pose world_from_eye(double at_s) const {
+    at_s = std::min(at_s, stands_from_s_);
     const auto wave = [&](int i, double period_s) {
       return std::sin(2 * std::numbers::pi * at_s / period_s + phases_[i]);
     };
@@ -71,7 +74,7 @@ class Headset {
     for (; at_s_ < until_s; at_s_ += 1.0 / 120, ++step_) {
       const Pose eye = world_from_eye(at_s_);
       drift(eye.translation);
-      if (sends_poses && step_ % 4 == 0) {
+      if (sends_poses && step_ % pose_every == 0) {
         const Pose feed = boxplus(world_from_feed_.inverse() * eye, noise(rng_, 0.2e-3, 0.1e-3));
         send(feed, at_s_ - clock_s_ - delay_s_, at_s_ + uniform(rng_, 0.005, 0.03));
       }
@@ -100,6 +103,8 @@ class Headset {
   // The odometry finds itself elsewhere.
   void jump() { world_from_feed_ = world_from_feed_ * Pose(exp_rotation({0, 0.3, 0}), {0.2, 0, 0.1}); }
 
+  // From now on the head does not move.
+  void stand_still() { stands_from_s_ = at_s_; }
   // Somebody fixes the marker elsewhere.
   void move_marker() {
     marker_from_eye_ = Pose(exp_rotation({0.2, -0.1, 0.2}), {0.02, 0.01, -0.02}) * marker_from_eye_;
@@ -138,6 +143,7 @@ class Headset {
   Pose world_from_feed_, marker_from_eye_;
   Vector6d creep_;
   double clock_s_ = 0, delay_s_ = 0, at_s_ = 100;
+  double stands_from_s_ = std::numeric_limits<double>::infinity();
   int step_ = 0;
 };
 

@@ -171,6 +171,20 @@ TEST(GlassesRegistration, WithoutTheMarkerItIsGivenUpInTheEnd) {
   EXPECT_NE(registration.advice().find("No camera"), std::string::npos) << registration.advice();
 }
 
+TEST(GlassesRegistration, AHeadAtRestMaySendFewPoses) {
+  auto rng = test::test_rng();
+  Headset headset(rng());
+  GlassesRegistration registration("apriltag_36h11:7");
+  headset.play(112, &registration);
+  const int used = registration.used();
+  headset.stand_still();
+  headset.pose_every = 60;  // two poses a second
+  headset.play(132, &registration);
+  ASSERT_TRUE(registration.place()) << registration.advice();
+  EXPECT_GT(registration.used(), used + 20);
+  EXPECT_LT(headset.error_of(*registration.place()).tail<3>().norm(), 2.5e-3);
+}
+
 TEST(GlassesRegistration, AMarkerOnAnotherHeadIsNoticed) {
   auto rng = test::test_rng();
   Headset headset(rng()), other(rng());
