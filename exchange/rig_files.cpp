@@ -240,7 +240,7 @@ Result<RigFile> read_poses_of_mpcdi(const std::filesystem::path& path, const Rig
 }
 
 bool is_mpcdi(const std::filesystem::path& path, const std::string& bytes) {
-  return (bytes.starts_with("PK") && path.extension() != ".npz") ||
+  return (bytes.compare(0, 2, "PK") == 0 && path.extension() != ".npz") ||
          bytes.find("<MPCDI") != std::string::npos || bytes.find("<mpcdi") != std::string::npos;
 }
 
@@ -274,7 +274,8 @@ Result<RigFile> read_rig_files(const std::vector<std::filesystem::path>& files,
   std::string names;
   std::vector<DataNode> roots;
   for (const std::filesystem::path& path : files) {
-    names += (names.empty() ? "" : ", ") + path.string();
+    if (!names.empty()) names += ", ";
+    names += path.string();
     LIMN_TRY(const std::string bytes, read_file(path));
     if (is_mpcdi(path, bytes)) {
       if (files.size() == 1) return read_poses_of_mpcdi(path, options);

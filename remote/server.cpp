@@ -14,6 +14,7 @@ namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds k_publish_interval{50}, k_unwatched_publish_interval{1000};
 constexpr std::chrono::milliseconds k_edit_time_budget{5};  // for edits, in one frame
+constexpr std::size_t k_max_tracks = 600;                   // viewers' tracks in one update
 constexpr std::chrono::seconds k_camera_delay{2};           // images of cameras may show a code for so long
 
 bool is_expired(const EditRequest& request, std::chrono::steady_clock::time_point now) {
@@ -76,6 +77,11 @@ RequestHandler::Setup Server::handler_setup(const std::string& host,
               [this](const std::string& guest, const std::optional<Eigen::Vector3d>& p_viewpoint_world) {
                 const std::lock_guard lock(mutex_);
                 viewpoints_[guest] = p_viewpoint_world;
+              },
+          .set_glasses =
+              [this](std::vector<std::string> lines) {
+                const std::lock_guard lock(mutex_);
+                glasses_ = std::move(lines);
               },
           .set_has_guests = [this](bool has_guests) { has_guests_ = has_guests; },
           .post = [network = network_.get()](std::function<void()> job) { network->post(std::move(job)); }};
@@ -181,6 +187,7 @@ void Server::publish_state(const session::Session& session,
                            Stamp at) {
   if (!begun_at_) begun_at_ = at;
   if (update_providers_) update_providers_(session);
+  collect_viewer_tracks(session);
   // Files that the state mentions must be complete on the disk, since guests may request them at once.
   if (session.store().is_busy()) return;
   const auto now = Clock::now();
@@ -193,10 +200,32 @@ void Server::publish_state(const session::Session& session,
   published_edits_ = edits;
   if (scenes_ != session.scenes()) {
     scene_ = std::make_shared<const scene::Scene>(session.setup().scene);
+    rig_ = std::make_shared<const Rig>(session.setup().rig);
     scenes_ = session.scenes();
   }
-  hand_over_update({session_state(session, telemetry, health, *begun_at_), session.composed().projectors,
-                    session.show_state().looks, scene_, std::exchange(edit_results_, {})});
+  hand_over_update({.state = session_state(session, telemetry, health, *begun_at_),
+                    .projector_images = session.composed().projectors,
+                    .looks = session.show_state().looks,
+                    .scene = scene_,
+                    .rig = rig_,
+                    .scenes = scenes_,
+                    .posed = session.composed().posed,
+                    .viewer_tracks = std::exchange(viewer_tracks_, {}),
+                    .at = at,
+                    .made_at = now,
+                    .edit_results = std::exchange(edit_results_, {})});
+}
+
+// What the cameras measured of the markers of viewers; each moment once.
+void Server::collect_viewer_tracks(const session::Session& session) {
+  const session::Percepts& percepts = session.percepts();
+  if (percepts.captured_at == tracks_at_ || !has_guests_) return;
+  tracks_at_ = percepts.captured_at;
+  for (std::size_t i = 0; i < session.setup().scene.viewers.size(); ++i)
+    for (const Track& track : percepts.tracks)
+      if (track.body == scene::viewer_body(i) && track.tracking == TrackingState::measured &&
+          viewer_tracks_.size() < k_max_tracks)
+        viewer_tracks_.push_back(track);
 }
 
 // Hands an update to the network's thread. An update that it has not taken yet is replaced; its edit results
@@ -204,9 +233,12 @@ void Server::publish_state(const session::Session& session,
 void Server::hand_over_update(SessionUpdate update) {
   {
     const std::lock_guard lock(mutex_);
-    if (update_)
+    if (update_) {
       update.edit_results.insert(update.edit_results.begin(), update_->edit_results.begin(),
                                  update_->edit_results.end());
+      update.viewer_tracks.insert(update.viewer_tracks.begin(), update_->viewer_tracks.begin(),
+                                  update_->viewer_tracks.end());
+    }
     update_ = std::move(update);
     if (std::exchange(is_update_posted_, true)) return;
   }

@@ -71,6 +71,10 @@ class Server : public session::SessionClient, public session::RemoteLink {
   void stop();
 
   const session::Invitation& invitation() const override { return invitation_; }
+  std::vector<std::string> glasses() const override {
+    const std::lock_guard lock(mutex_);
+    return glasses_;
+  }
   int port() const { return network_->port(); }
 
   static constexpr std::size_t k_max_edits_at_once = 64;
@@ -82,6 +86,7 @@ class Server : public session::SessionClient, public session::RemoteLink {
   void invite_guests(const std::string& host, const std::optional<Certificate>& certificate);
   std::optional<EditRequest> next_edit_request();
   void hand_over_update(SessionUpdate update);
+  void collect_viewer_tracks(const session::Session& session);
 
   session::Invitation invitation_;
   WorkerThread worker_;
@@ -89,9 +94,10 @@ class Server : public session::SessionClient, public session::RemoteLink {
   std::unique_ptr<Network> network_;
   std::atomic<bool> has_guests_ = false;  // whether somebody is paired
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::deque<EditRequest> edit_requests_;                             // from the network to the session
   std::map<std::string, std::optional<Eigen::Vector3d>> viewpoints_;  // likewise, the newest of each guest
+  std::vector<std::string> glasses_;                                  // lines for the operator
   std::optional<SessionUpdate> update_;                               // from the session to the network
   bool is_update_posted_ = false;
 
@@ -99,6 +105,9 @@ class Server : public session::SessionClient, public session::RemoteLink {
   std::vector<EditResult> edit_results_;
   std::function<void(const session::Session&)> update_providers_;
   std::shared_ptr<const scene::Scene> scene_;
+  std::shared_ptr<const Rig> rig_;
+  std::vector<Track> viewer_tracks_;  // since the last update, for glasses
+  Stamp tracks_at_;                   // the moment of the newest of them
   int scenes_ = 0;
   ProjectedCode code_;
   std::optional<Clock::time_point> published_at_;

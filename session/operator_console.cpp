@@ -136,6 +136,7 @@ OperatorView OperatorConsole::view_of(const Session& session,
     view.waiting.push_back(loose.marker.text());
   view.remote = remote_;
   if (view.remote) view.remote->projector = remote_link_->code_projector();
+  if (view.remote) view.remote->glasses = remote_link_->glasses();
   view.windows = {session.windows().begin(), session.windows().end()};
   view.follows = session.composed().follows;
   if (const auto& drift = session.drift())

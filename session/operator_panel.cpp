@@ -373,6 +373,7 @@ void OperatorPanel::draw_remote(gui::Gui& gui, const OperatorView& view, ImVec2 
         asked_.code = {projector.name, chosen.role};
   }
   draw_viewers(gui, view);
+  for (const std::string& glasses : remote.glasses) ImGui::TextUnformatted(glasses.c_str());
   const std::pair<const char*, const std::string&> fingerprints[] = {
       {"SHA-256 of the certificate", remote.fingerprint},
       {"SHA-256 of /limn.crt", remote.authority_fingerprint}};

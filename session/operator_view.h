@@ -57,7 +57,8 @@ struct OperatorView {
     std::string fingerprint;            ///< fingerprint of the certificate; empty without TLS
     std::string authority_fingerprint;  ///< fingerprint of /limn.crt; empty without TLS
     std::vector<Entrance> entrances;
-    std::string projector = {};  ///< the projector that shows a code; empty: none
+    std::string projector = {};             ///< the projector that shows a code; empty: none
+    std::vector<std::string> glasses = {};  ///< a line for each guest who wears glasses
   };
   double at_s = 0;  ///< by the session's clock, since the session began
   std::vector<Image> cameras, projectors;

@@ -29,6 +29,7 @@ class RemoteLink {
   /// The projector that shows the code; empty: none.
   virtual const std::string& code_projector() const = 0;
   virtual const Invitation& invitation() const = 0;
+  virtual std::vector<std::string> glasses() const { return {}; }  ///< lines about guests' glasses
 };
 
 }  // namespace limn::session

@@ -79,6 +79,27 @@ class Reader {
     return value->get<bool>();
   }
 
+  double real(const char* key) {
+    const json* value = member(key, false);
+    if (!value) return 0;
+    if (!value->is_number()) return problem(key, "a number", found_in(*value)), 0;
+    return value->get<double>();
+  }
+
+  // A list of numbers.
+  template <int count>
+  Eigen::Matrix<double, count, 1> reals(const char* key) {
+    Eigen::Matrix<double, count, 1> out = Eigen::Matrix<double, count, 1>::Zero();
+    const json* value = member(key, false);
+    if (!value) return out;
+    const bool is_list =
+        value->is_array() && value->size() == count &&
+        std::all_of(value->begin(), value->end(), [](const json& each) { return each.is_number(); });
+    if (!is_list) return problem(key, fmt::format("a list of {} numbers", count), found_in(*value)), out;
+    for (int i = 0; i < count; ++i) out[i] = (*value)[static_cast<std::size_t>(i)].template get<double>();
+    return out;
+  }
+
   void problem(const std::string& key, const std::string& expected, const std::string& found) {
     if (!problem_) problem_ = error("{}: expected {}, found {}.", key, expected, found);
   }
@@ -163,7 +184,18 @@ Message read_message(const std::string& type, Reader* reader) {
                       in_quotes(window.device));
     return window;
   }
-  reader->problem("type", "edit, comment, pictures, seen or window", in_quotes(type));
+  if (type == "glasses")
+    return GlassesMessage{reader->boolean("on"), reader->text("marker", k_longest_word, true)};
+  if (type == "glasses_pose")
+    return GlassesPoseMessage{reader->real("at_s"), reader->reals<4>("rotation_wxyz"),
+                              reader->reals<3>("translation_m")};
+  if (type == "glasses_state") {
+    const std::string is = reader->text("is", k_longest_word, false);
+    if (is != "asleep" && is != "lost") reader->problem("is", "asleep or lost", in_quotes(is));
+    return GlassesStateMessage{is == "asleep"};
+  }
+  reader->problem("type", "edit, comment, pictures, seen, window, glasses, glasses_pose or glasses_state",
+                  in_quotes(type));
   return {};
 }
 

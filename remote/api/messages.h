@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -49,7 +50,29 @@ struct WindowMessage {
   bool on = false;
   TabletViewMode parts = TabletViewMode::as_screen;
 };
-using Message = std::variant<EditMessage, CommentMessage, ImagesMessage, ImageShownMessage, WindowMessage>;
+/// `glasses`: puts glasses on or takes them off.
+struct GlassesMessage {
+  bool on = false;
+  std::string marker;  ///< The marker on them; empty: the first of the scene's that no others use.
+};
+/// `glasses_pose`: the eye's pose by the glasses' odometry, feed_from_eye, at a moment of the page's clock.
+struct GlassesPoseMessage {
+  double at_s = 0;
+  Eigen::Vector4d rotation_wxyz = {1, 0, 0, 0};  ///< As sent; it may be of any length.
+  Eigen::Vector3d translation_m = {0, 0, 0};
+};
+/// `glasses_state`: the glasses do not track, or sleep.
+struct GlassesStateMessage {
+  bool is_asleep = false;
+};
+using Message = std::variant<EditMessage,
+                             CommentMessage,
+                             ImagesMessage,
+                             ImageShownMessage,
+                             WindowMessage,
+                             GlassesMessage,
+                             GlassesPoseMessage,
+                             GlassesStateMessage>;
 
 /// Parses a text message. Errors say what was expected: no JSON object, an unknown type or action, keys that
 /// are missing, unknown or of another type, text that is too long or has control characters. Whether slots,

@@ -5,6 +5,7 @@
 #include "core/json_text.h"
 #include "remote/api/responses.h"
 #include "remote/api/roles.h"
+#include "remote/glasses/glasses_messages.h"
 
 namespace limn::remote {
 namespace {
@@ -34,6 +35,8 @@ const std::vector<RequestHandler::Route>& RequestHandler::routes() {
       {"GET", "/picture/look/", Role::look, &RequestHandler::get_look_image},
       {"GET", "/picture/variant/", Role::look, &RequestHandler::get_variant_image},
       {"GET", "/look/", Role::look, &RequestHandler::get_look_assembly},
+      {"GET", "/glasses/light.json", Role::look, &RequestHandler::get_glasses_light},
+      {"GET", "/glasses/", Role::look, &RequestHandler::get_glasses_mesh},
       {"POST", "/api/comment", Role::work, &RequestHandler::post_comment},
   };
   return all;
@@ -71,7 +74,8 @@ RequestHandler::RequestHandler(Setup setup)
       comments_(setup_.worker, setup_.post),
       session_files_(setup_.worker),
       room_images_(&clients_, &setup_.providers, setup_.post),
-      tablet_windows_(&clients_, &setup_.providers, setup_.set_viewpoint, setup_.post) {}
+      tablet_windows_(&clients_, &setup_.providers, setup_.set_viewpoint, setup_.post),
+      glasses_(&clients_, setup_.set_viewpoint) {}
 
 // ---- HTTP ----
 
@@ -86,7 +90,8 @@ void RequestHandler::handle_request(const HttpRequest& request, ResponseCallback
     return respond(request.method == "POST"
                        ? pair_guest(request)
                        : error_response(k_http_method_not_allowed, "/api/pair: expected POST."));
-  if (!path->starts_with("/api/") && !path->starts_with("/picture/") && !path->starts_with("/look/"))
+  if (!path->starts_with("/api/") && !path->starts_with("/picture/") && !path->starts_with("/look/") &&
+      !path->starts_with("/glasses/"))
     return respond(static_file(request, *path));
   const auto guest = authentication_.guest_of(request);
   if (!guest) return respond(error_response(k_http_unauthorized, k_not_paired));
@@ -160,6 +165,16 @@ void RequestHandler::get_variant_image(const AuthenticatedRequest& request, Resp
   session_files_.send_variant_image(request.path, state_.update(), std::move(respond));
 }
 
+void RequestHandler::get_glasses_mesh(const AuthenticatedRequest& request, ResponseCallback respond) {
+  session_files_.send_mesh(request.path, state_.update(), std::move(respond));
+}
+
+void RequestHandler::get_glasses_light(const AuthenticatedRequest&, ResponseCallback respond) {
+  const SessionUpdate* update = state_.update();
+  respond(update && update->rig ? json_response(glasses_light_json(*update->rig))
+                                : error_response(k_http_unavailable, "the session has not begun yet."));
+}
+
 void RequestHandler::post_comment(const AuthenticatedRequest& request, ResponseCallback respond) {
   const auto comment = parse_comment(request.body);
   if (!comment) return respond(error_response(k_http_bad_request, comment.message()));
@@ -217,6 +232,7 @@ void RequestHandler::add_client(const ClientPtr& client) {
 
 void RequestHandler::remove_client(const ClientPtr& client) {
   tablet_windows_.close_window(client);
+  glasses_.take_off(client);
   if (std::erase(clients_, client) > 0) publish_state();
 }
 
@@ -265,6 +281,22 @@ void RequestHandler::handle_message(const ClientPtr& client, const WindowMessage
   if (!updated) refuse_message(client, std::nullopt, updated.message());
 }
 
+void RequestHandler::handle_message(const ClientPtr& client, const GlassesMessage& message) {
+  const Status updated = glasses_.update_glasses(client, message);
+  if (!updated) refuse_message(client, std::nullopt, updated.message());
+  publish_state();
+}
+
+void RequestHandler::handle_message(const ClientPtr& client, const GlassesPoseMessage& message) {
+  const Status received = glasses_.receive_pose(client, message, Clock::now());
+  if (!received) refuse_message(client, std::nullopt, received.message());
+}
+
+void RequestHandler::handle_message(const ClientPtr& client, const GlassesStateMessage& message) {
+  const Status received = glasses_.receive_state(client, message);
+  if (!received) refuse_message(client, std::nullopt, received.message());
+}
+
 EditCallback RequestHandler::answer_to(const ClientPtr& client, std::uint64_t id) {
   return [this, client, id](const std::string& why, std::uint64_t number) {
     if (!why.empty()) return refuse_message(client, std::optional(id), why);
@@ -301,6 +333,7 @@ std::optional<HttpResponse> RequestHandler::add_comment(const AuthSessions::Gues
 
 void RequestHandler::apply_update(SessionUpdate update) {
   const std::vector<EditResult> results = std::exchange(update.edit_results, {});
+  glasses_.apply_update(update);
   state_.set_update(std::move(update));
   comments_.load_once(state_.update()->scene->folder);
   publish_state();
@@ -316,6 +349,7 @@ void RequestHandler::update_at(Clock::time_point now) {
   }
   edits_.expire(now, state_.number());
   room_images_.update_at(now);
+  if (glasses_.update_at(now)) publish_state();
 }
 
 void RequestHandler::close_clients(const std::string& why) {

@@ -13,6 +13,7 @@
 #include "core/worker_thread.h"
 #include "remote/api/authentication.h"
 #include "remote/api/comment_store.h"
+#include "remote/api/glasses_clients.h"
 #include "remote/api/messages.h"
 #include "remote/api/pending_edits.h"
 #include "remote/api/room_image_publisher.h"
@@ -44,6 +45,7 @@ class RequestHandler : public HttpHandler {
     WorkerThread* worker = nullptr;
     std::function<void(EditRequest)> submit_edit;  ///< Hands an edit to the session.
     SetViewpoint set_viewpoint;
+    std::function<void(std::vector<std::string>)> set_glasses;  ///< Lines about glasses for the operator.
     std::function<void(bool)> set_has_guests;  ///< Tells the session whether anybody is paired.
     NetworkPost post;
   };
@@ -92,6 +94,8 @@ class RequestHandler : public HttpHandler {
   void get_look_image(const AuthenticatedRequest& request, ResponseCallback respond);
   void get_look_assembly(const AuthenticatedRequest& request, ResponseCallback respond);
   void get_variant_image(const AuthenticatedRequest& request, ResponseCallback respond);
+  void get_glasses_mesh(const AuthenticatedRequest& request, ResponseCallback respond);
+  void get_glasses_light(const AuthenticatedRequest& request, ResponseCallback respond);
   void post_comment(const AuthenticatedRequest& request, ResponseCallback respond);
   void post_edit(const AuthenticatedRequest& request, ResponseCallback respond);
   void post_leave(const AuthenticatedRequest& request, ResponseCallback respond);
@@ -107,6 +111,9 @@ class RequestHandler : public HttpHandler {
   void handle_message(const ClientPtr& client, const ImagesMessage& message);
   void handle_message(const ClientPtr& client, const ImageShownMessage& message);
   void handle_message(const ClientPtr& client, const WindowMessage& message);
+  void handle_message(const ClientPtr& client, const GlassesMessage& message);
+  void handle_message(const ClientPtr& client, const GlassesPoseMessage& message);
+  void handle_message(const ClientPtr& client, const GlassesStateMessage& message);
 
   std::optional<HttpResponse> add_comment(const AuthSessions::Guest& guest,
                                           const CommentRequest& comment,
@@ -114,7 +121,10 @@ class RequestHandler : public HttpHandler {
   EditCallback answer_to(const ClientPtr& client, std::uint64_t id);
   void refuse_message(const ClientPtr& client, std::optional<std::uint64_t> id, const std::string& why);
   void refuse_message(const ClientPtr& client, std::uint64_t id, const HttpResponse& refusal);
-  void publish_state() { state_.publish(comments_.newest()); }
+  void publish_state() {
+    if (setup_.set_glasses) setup_.set_glasses(glasses_.lines());
+    state_.publish(comments_.newest());
+  }
 
   Setup setup_;
   Authentication authentication_;
@@ -125,6 +135,7 @@ class RequestHandler : public HttpHandler {
   SessionFiles session_files_;
   RoomImagePublisher room_images_;
   TabletWindows tablet_windows_;
+  GlassesClients glasses_;
 };
 
 }  // namespace limn::remote

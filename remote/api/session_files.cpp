@@ -110,6 +110,30 @@ void SessionFiles::send_look_assembly(const std::string& path,
       std::move(respond));
 }
 
+void SessionFiles::send_mesh(const std::string& path, const SessionUpdate* update, ResponseCallback respond) {
+  constexpr std::string_view k_begin = "/glasses/part/";
+  const bool is_prototype = path == "/glasses/prototype.glb";
+  const auto slash = path.find('/', k_begin.size());
+  const auto slot_name = is_prototype || slash == std::string::npos || !path.starts_with(k_begin)
+                             ? std::nullopt
+                             : decoded(std::string_view(path).substr(k_begin.size(), slash - k_begin.size()));
+  const auto variant_name = slot_name ? name_in(path, path.substr(0, slash) + "/", ".glb") : std::nullopt;
+  const scene::Mesh* mesh = nullptr;
+  if (update && is_prototype && update->scene->prototype) mesh = &update->scene->prototype->mesh;
+  if (const scene::Slot* slot = update && variant_name ? update->scene->find_slot(*slot_name) : nullptr)
+    for (const scene::Variant& variant : slot->variants)
+      if (variant.name == *variant_name) mesh = &variant.mesh;
+  if (!mesh)
+    return respond(error_response(
+        k_http_not_found, "expected the prototype, or a slot and a variant of the state, found others."));
+  respond_from_worker(
+      [scene = update->scene, mesh] {
+        const scene::GlbNode node{"mesh", mesh, Pose()};
+        return uncached_response("model/gltf-binary", scene::encode_glb(std::span(&node, 1)));
+      },
+      std::move(respond));
+}
+
 void SessionFiles::send_variant_image(const std::string& path,
                                       const SessionUpdate* update,
                                       ResponseCallback respond) {

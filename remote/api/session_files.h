@@ -26,6 +26,9 @@ class SessionFiles {
   void send_look_image(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
   /// /look/NAME.glb: the parts of a look on the prototype, in metres.
   void send_look_assembly(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
+  /// The mesh of the prototype or of a variant in its own frame, as glTF: /glasses/prototype.glb and
+  /// /glasses/part/SLOT/VARIANT.glb.
+  void send_mesh(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
   /// /picture/variant/SLOT/VARIANT.png: a variant by itself.
   void send_variant_image(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
 

@@ -21,8 +21,11 @@ ordered_json numberless_state(const SessionState& session,
                           {"slot", session.last_edit->edit.slot},
                           {"value", session.last_edit->edit.value}};
   state["guests"] = ordered_json::array();
-  for (const auto& client : clients)
-    state["guests"].push_back({{"name", client->guest.name}, {"role", name_of(client->guest.role)}});
+  for (const auto& client : clients) {
+    ordered_json guest = {{"name", client->guest.name}, {"role", name_of(client->guest.role)}};
+    if (client->glasses) guest["glasses"] = name_of(client->glasses->registration.state());
+    state["guests"].push_back(std::move(guest));
+  }
   state["comments"] = ordered_json::array();
   for (const scene::Comment& comment : comments)
     state["comments"].push_back({{"at", comment.at},

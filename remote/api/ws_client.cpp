@@ -33,6 +33,8 @@ std::optional<Outgoing> Outbox::next_message() {
     answers_.pop_front();
     return Outgoing{std::move(text)};
   }
+  if (glasses_) return Outgoing{std::exchange(glasses_, nullptr)};
+  if (parts_) return Outgoing{std::exchange(parts_, nullptr)};
   if (state_) return Outgoing{std::exchange(state_, nullptr)};
   if (window_) return Outgoing{std::exchange(window_, nullptr), false};
   if (room_) return Outgoing{std::exchange(room_, nullptr), false};

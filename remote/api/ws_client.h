@@ -11,6 +11,7 @@
 
 #include "remote/api/auth_sessions.h"
 #include "remote/api/messages.h"
+#include "remote/glasses/glasses_registration.h"
 #include "remote/http/http_handler.h"
 
 namespace limn::remote {
@@ -27,6 +28,9 @@ class Outbox {
   void add_answer(std::string text);
   void set_state(std::shared_ptr<const std::string> text) { state_ = std::move(text); }
   void set_image(ImageKind kind, std::shared_ptr<const std::string> bytes);
+  /// For glasses: their place in the room, and the parts' poses.
+  void set_glasses(std::shared_ptr<const std::string> text) { glasses_ = std::move(text); }
+  void set_parts(std::shared_ptr<const std::string> text) { parts_ = std::move(text); }
   /// Sends `bye` with a reason and then ends the connection. A second call does nothing.
   void end(const std::string& why);
 
@@ -36,7 +40,7 @@ class Outbox {
 
  private:
   std::deque<std::string> answers_;
-  std::shared_ptr<const std::string> state_, room_, window_;
+  std::shared_ptr<const std::string> state_, room_, window_, glasses_, parts_;
   std::shared_ptr<const std::string> bye_;
   bool is_ending_ = false;
 };
@@ -77,12 +81,24 @@ struct WsClient {
     bool is_open() const { return !device.empty(); }
   };
 
+  /// Glasses that draw the parts themselves (GlassesClients).
+  struct Glasses {
+    explicit Glasses(const std::string& marker_name) : marker(marker_name), registration(marker_name) {}
+    std::string marker;  ///< The name of the marker on them.
+    GlassesRegistration registration;
+    GlassesState state = GlassesState::waiting;  ///< As all guests know it.
+    std::string sent;                            ///< The last message.
+    std::chrono::steady_clock::time_point sent_at, viewpoint_at;
+  };
+
   AuthSessions::Guest guest;
   Outbox outbox;
   std::function<void()> wake;  ///< Tells the connection that the outbox has something new.
   RateLimit rate_limit{k_messages_per_s, k_messages_at_once};
   Room room;
   Window window;
+  std::optional<Glasses> glasses;  ///< nullopt: it has none on.
+  std::chrono::steady_clock::time_point glasses_refused_at;
 
   /// The longest message that it may send now, bytes.
   std::size_t longest_message() const { return window.is_open() ? k_longest_frame : k_longest_message; }

@@ -97,8 +97,8 @@ function texture_of(gltf, bin, material, decoded) {
 }
 
 /**
- * Returns the meshes [{name, matrix, positions, normals, uvs, indices, base, texture, is_unlit}] of a file's scene. `base` is linear
- * RGBA; uvs and texture (a bitmap) may be null. Throws an Error whose message can be shown.
+ * Returns the meshes [{name, matrix, positions, normals, uvs, indices, base, texture, cut_below, is_unlit}] of a file's scene. `base` is
+ * linear RGBA; where the texture's alpha is below `cut_below` the surface has holes; uvs and texture (a bitmap) may be null. Throws an Error whose message can be shown.
  */
 export async function read_glb(buffer) {
   const [gltf, bin] = chunks_of(buffer);
@@ -127,6 +127,7 @@ export async function read_glb(buffer) {
         normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal),
         uvs: uv === undefined ? null : numbers_of(gltf, bin, uv),
         texture: texture_of(gltf, bin, material, decoded),
+        cut_below: whole?.alphaMode === "MASK" ? (whole.alphaCutoff ?? 0.5) : 0,
         is_unlit: whole?.extensions?.KHR_materials_unlit !== undefined,
       });
     }

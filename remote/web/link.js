@@ -13,7 +13,8 @@ async function post(path, message) {
 }
 
 /**
- * Events (detail): "status" {status, why} with status unpaired, connecting, waiting or connected; "hello", "state";
+ * Events (detail): "status" {status, why} with status unpaired, connecting, waiting or connected; "hello", "state",
+ * "glasses", "glasses_parts"; "refused" (why), of a message that is no edit or comment;
  * "picture" (image of the room) and "answer" (image of the window) {number, json, jpeg}.
  */
 export class Link extends EventTarget {
@@ -139,7 +140,10 @@ export class Link extends EventTarget {
     } else if (message.type === "done") {
       this.#settle(message.id, undefined, message.number);
     } else if (message.type === "refused") {
-      this.#settle(message.id, message.why);
+      if (message.id === null) this.dispatchEvent(new CustomEvent("refused", { detail: message.why }));
+      else this.#settle(message.id, message.why);
+    } else if (message.type === "glasses" || message.type === "glasses_parts") {
+      this.dispatchEvent(new CustomEvent(message.type, { detail: message }));
     } else if (message.type === "bye") {
       this.#end(message.why || "The session is over.");
     }

@@ -1,5 +1,6 @@
 // The remote's page: the live image, and panels with controls.
 import { by_id, h, icon } from "/dom.js";
+import { make_glasses } from "/glasses.js";
 import { make_light } from "/light.js";
 import { make_looks } from "/looks.js";
 import { make_parts } from "/parts.js";
@@ -31,6 +32,7 @@ const panels = [
   make_looks(session),
   make_light(session),
   make_window(session, stage),
+  make_glasses(session, stage),
   make_room(session),
 ];
 

@@ -3,6 +3,15 @@ import { make_comments } from "/comments.js";
 import { by_id, h, keep, set_text } from "/dom.js";
 import { tracking_badge } from "/parts.js";
 
+const k_glasses = {
+  waiting: "glasses that no camera sees",
+  looking_round: "glasses that find the room",
+  registered: "glasses",
+  lost: "glasses without tracking",
+  asleep: "glasses asleep",
+};
+const words_of = ({ role, glasses }) => (glasses ? `${role}, ${k_glasses[glasses] ?? glasses}` : role);
+
 const k_most_notes = 20; // only the newest are shown
 
 function row(name) {
@@ -87,8 +96,8 @@ export function make_room(session) {
       keep(
         people,
         state.guests.map((guest, i) => ({ ...guest, i })),
-        (guest) => `${guest.name} ${guest.role} ${guest.i}`,
-        (guest) => h("li", {}, h("b", {}, guest.name || "Guest"), h("span", { class: "soft small" }, guest.role)),
+        (guest) => `${guest.name} ${guest.role} ${guest.glasses} ${guest.i}`,
+        (guest) => h("li", {}, h("b", {}, guest.name || "Guest"), h("span", { class: "soft small" }, words_of(guest))),
       );
       repair.disabled = state.repair !== "";
       set_text(repair_words, state.repair ? `Repair: ${state.repair}` : "Repair: recalibrate moved devices");

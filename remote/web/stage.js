@@ -21,8 +21,9 @@ export function make_stage(session) {
   const blackout = make_switch(session, "blackout", (s) => s.blackout, icon("blackout"), "Blackout");
   const freeze = make_switch(session, "freeze", (s) => s.frozen, icon("freeze"), "Freeze");
   by_id("stage-buttons").append(freeze, blackout);
-  let is_hidden_by_window = false;
-  const want = () => session.link.want_pictures(!document.hidden && !is_hidden_by_window);
+  let is_hidden_by_window = false,
+    is_resting = false;
+  const want = () => session.link.want_pictures(!document.hidden && !is_hidden_by_window && !is_resting);
   document.addEventListener("visibilitychange", want);
   want();
 
@@ -56,6 +57,11 @@ export function make_stage(session) {
       freeze.show(state);
       set_text(by_id("last-edit"), in_words(state.last_edit, state));
       stage.say_why();
+    },
+    /** While glasses are on, nobody sees the room's image: it is not requested. */
+    rest(rests) {
+      is_resting = rests;
+      want();
     },
     say_why() {
       set_text(by_id("view-why"), stage.words || why(session.state));

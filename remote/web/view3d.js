@@ -1,5 +1,6 @@
 // An interactive 3D view of the parts in WebGL 2; it is drawn only after a change.
 import { product } from "/glb.js";
+import { delete_mesh, k_shading, make_program, upload_mesh } from "/mesh_gl.js";
 
 const k_vertex = `#version 300 es
 uniform mat4 u_view_from_model, u_clip_from_view;
@@ -22,73 +23,14 @@ uniform float u_glow, u_unlit;
 in vec3 v_normal, v_position;
 in vec2 v_uv;
 out vec4 o_colour;
+${k_shading}
 void main() {
-  vec3 n = normalize(v_normal), eye = normalize(-v_position);
-  if (dot(n, eye) < 0.0) n = -n;
-  float key = max(dot(n, normalize(vec3(0.5, 0.8, 0.6))), 0.0), fill = 0.5 + 0.5 * n.y;
-  float rim = pow(1.0 - max(dot(n, eye), 0.0), 3.0);
   vec3 base = u_base.rgb * texture(u_texture, v_uv).rgb;
-  vec3 lit = base * (0.16 + 0.22 * fill + 0.75 * key) + vec3(0.06) * rim;
+  vec3 lit = shaded(base, normalize(v_normal), normalize(-v_position));
   vec3 linear = mix(lit, base, u_unlit) + u_glow * vec3(0.35, 0.2, 0.04);
   o_colour = vec4(pow(linear, vec3(1.0 / 2.2)), 1);
 }`;
 const k_fov = (35 * Math.PI) / 180;
-
-function program_of(gl) {
-  const program = gl.createProgram();
-  for (const [type, text] of [
-    [gl.VERTEX_SHADER, k_vertex],
-    [gl.FRAGMENT_SHADER, k_fragment],
-  ]) {
-    const shader = gl.createShader(type);
-    gl.shaderSource(shader, text);
-    gl.compileShader(shader);
-    gl.attachShader(program, shader);
-  }
-  ["a_position", "a_normal", "a_uv"].forEach((name, i) => gl.bindAttribLocation(program, i, name));
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-  return program;
-}
-
-function upload(gl, mesh) {
-  const array = gl.createVertexArray();
-  gl.bindVertexArray(array);
-  const attribute = (index, numbers, width) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, numbers, gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(index);
-    gl.vertexAttribPointer(index, width, gl.FLOAT, false, 0, 0);
-  };
-  attribute(0, mesh.positions, 3);
-  attribute(1, mesh.normals, 3);
-  if (mesh.uvs) attribute(2, mesh.uvs, 2);
-  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
-  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
-  return { ...mesh, array, count: mesh.indices.length, texture: texture_of(gl, mesh.texture) };
-}
-
-// Makes a texture from an image, or from one white pixel.
-function texture_of(gl, picture) {
-  const texture = gl.createTexture();
-  gl.bindTexture(gl.TEXTURE_2D, texture);
-  if (picture) gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-  else
-    gl.texImage2D(
-      gl.TEXTURE_2D,
-      0,
-      gl.SRGB8_ALPHA8,
-      1,
-      1,
-      0,
-      gl.RGBA,
-      gl.UNSIGNED_BYTE,
-      new Uint8Array([255, 255, 255, 255]),
-    );
-  gl.generateMipmap(gl.TEXTURE_2D);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
-  return texture;
-}
 
 function box_of(meshes) {
   const low = [Infinity, Infinity, Infinity],
@@ -150,17 +92,14 @@ export class View3d {
     this.#canvas = canvas;
     this.#gl = canvas.getContext("webgl2", { antialias: true });
     if (!this.#gl) throw new Error("This browser has no WebGL 2. Looks are shown as images only.");
-    this.#program = program_of(this.#gl);
+    this.#program = make_program(this.#gl, k_vertex, k_fragment);
     new ResizeObserver(() => this.#due()).observe(canvas);
     this.#listen();
   }
 
   show(meshes) {
-    for (const { array, texture } of this.#meshes) {
-      this.#gl.deleteVertexArray(array);
-      this.#gl.deleteTexture(texture);
-    }
-    this.#meshes = meshes.map((mesh) => upload(this.#gl, mesh));
+    for (const mesh of this.#meshes) delete_mesh(this.#gl, mesh);
+    this.#meshes = meshes.map((mesh) => upload_mesh(this.#gl, mesh));
     this.#box = box_of(meshes);
     this.#due();
   }

@@ -65,7 +65,8 @@ const std::map<std::string, std::map<std::string, int>>& inner_order() {
         {"calib/judge", 3},
         {"calib/report", 4}}},
       {"wizard", {{"wizard/capture", 0}, {"wizard/measure", 0}, {"wizard", 1}, {"wizard/window", 2}}},
-      {"remote", {{"remote/http", 0}, {"remote/tablet", 0}, {"remote/api", 1}, {"remote", 2}}},
+      {"remote",
+       {{"remote/http", 0}, {"remote/tablet", 0}, {"remote/glasses", 0}, {"remote/api", 1}, {"remote", 2}}},
   };
   return order;
 }

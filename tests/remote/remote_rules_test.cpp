@@ -93,7 +93,8 @@ TEST(RemoteMessages, AreThoseOfTheDocumentation) {
     EXPECT_TRUE(message) << text << ": " << (message ? "" : message.message());
     types.insert(json::parse(text)["type"].get<std::string>());
   }
-  EXPECT_EQ(types, (std::set<std::string>{"edit", "comment", "pictures", "seen", "window"}));
+  EXPECT_EQ(types, (std::set<std::string>{"edit", "comment", "pictures", "seen", "window", "glasses",
+                                          "glasses_pose", "glasses_state"}));
 }
 
 TEST(RemoteMessages, EveryActionIsAMessage) {
@@ -124,7 +125,9 @@ TEST(RemoteMessages, RefuseWithAReason) {
   has("{\"type\": \"edit\"", "expected a JSON object");
   has("{}", "type: expected it, found no such key");
   has(R"({"type": 3})", "type: expected text, found '3'");
-  has(R"({"type": "dance"})", "type: expected edit, comment, pictures, seen or window, found 'dance'");
+  has(R"({"type": "dance"})",
+      "type: expected edit, comment, pictures, seen, window, glasses, glasses_pose or glasses_state, found "
+      "'dance'");
   has(R"({"type": "edit", "id": 1, "action": "dance"})", "action: expected one of GET /api/actions");
   has(R"({"type": "edit", "id": -1, "action": "flip"})", "id: expected a whole number");
   has(R"({"type": "edit", "id": 1.5, "action": "flip"})", "id: expected a whole number");

@@ -43,6 +43,7 @@ class AServedSession : public AServer {
     setup.scene.folder = folder_ / "project";
     setup.screens = {"wall", "desk"};
     fs::create_directories(setup.scene.folder);
+    prepare(&setup);
     auto telemetry = session::Telemetry::create({});
     ASSERT_TRUE(telemetry);
     telemetry_.emplace(std::move(*telemetry));
@@ -53,6 +54,7 @@ class AServedSession : public AServer {
     open({}, echoing_providers());
   }
   void TearDown() override { server_.reset(); }
+  virtual void prepare(session::SessionSetup*) {}
 
   // What a projector shows, as the frame loop hands it over.
   cv::Mat lit_by(std::size_t projector) {
@@ -231,6 +233,90 @@ TEST_F(AServedSession, TellsTheStateOfTheDocumentation) {
         "split_mm", "screen",  "viewer",    "follows",       "windows", "screens",    "projectors",
         "devices",  "waiting", "guests",    "comments",      "notes",   "repair",     "pace"})
     EXPECT_TRUE(state.contains(key)) << key;
+}
+
+// With a viewer whose marker is on glasses.
+class GlassesInASession : public AServedSession {
+ protected:
+  void prepare(session::SessionSetup* setup) override {
+    scene::Viewer wearer;
+    wearer.marker = MarkerName{"apriltag_36h11", "40"};
+    wearer.marker_size_m = 0.06;
+    setup->scene.viewers.push_back(wearer);
+  }
+};
+
+TEST_F(GlassesInASession, ChangeNoProjectorImageWhetherOnOrOff) {
+  sim::VirtualRig rig(test::studio_world(0.25), {.grab_waits_for_light = false});
+  session::Perception perception =
+      session::Perception::create(session_->setup().scene, session_->setup().rig).value();
+  const int camera = 0;
+  for (std::size_t i = 1; i <= 4; ++i)
+    session_->update_percepts(perception.watch(rig.expose(std::span(&camera, 1))), i);
+  const Stamp seen_at = session_->percepts().captured_at;
+  // What fades in is there after some frames.
+  for (int i = 0; i < 5; ++i)
+    session_->compose_and_record(shifted(seen_at, 0.1 * i), shifted(seen_at, 0.1 * i));
+  const Stamp shown_at = shifted(seen_at, 0.4);
+  const std::vector<cv::Mat> before = session_->compose_and_record(shown_at, shown_at).projectors;
+  const auto is_as_before = [&] {
+    const std::vector<cv::Mat> now = session_->compose_and_record(shown_at, shown_at).projectors;
+    return std::equal(now.begin(), now.end(), before.begin(), before.end(),
+                      [](const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; });
+  };
+  EXPECT_GT(cv::countNonZero(before.at(0).reshape(1)), 0);
+  ASSERT_TRUE(is_as_before()) << "the same moment gives the same images";
+  const auto ann = guest(Role::look, "Ann");
+  json glasses, state;
+  play_while([&] {
+    ann->message_of("state");
+    ann->send_text(R"({"type": "glasses", "on": true})");
+    for (int i = 0; i < 20; ++i) {
+      const json pose = {{"type", "glasses_pose"},
+                         {"at_s", 7 + 0.033 * i},
+                         {"rotation_wxyz", {1, 0, 0, 0}},
+                         {"translation_m", {0.01 * i, 1.6, 0}}};
+      ann->send_text(pose.dump());
+      std::this_thread::sleep_for(30ms);
+    }
+    glasses = json::parse(ann->message_of("glasses").value());
+    state = json::parse(client()->get("/api/state", token_of(Role::look, "Ben")).body);
+  });
+  EXPECT_EQ(glasses["marker"], "apriltag_36h11:40");
+  EXPECT_EQ(state["guests"][0]["glasses"], "waiting") << state["guests"];
+  EXPECT_EQ(server_->glasses(),
+            std::vector<std::string>{"Ann's glasses (apriltag_36h11:40): no camera sees the marker"});
+  EXPECT_TRUE(is_as_before());
+  play_while([&] {
+    ann->send_text(R"({"type": "glasses", "on": false})");
+    std::this_thread::sleep_for(100ms);
+  });
+  EXPECT_TRUE(server_->glasses().empty());
+  EXPECT_TRUE(is_as_before());
+}
+
+TEST_F(GlassesInASession, GetMeshesAndTheLight) {
+  play_while([&] {
+    const std::string token = token_of(Role::look, "Ann");
+    const auto prototype = client()->get("/glasses/prototype.glb", token);
+    EXPECT_EQ(prototype.status, 200);
+    EXPECT_EQ(prototype.body.substr(0, 4), "glTF");
+    EXPECT_EQ(client()->get("/glasses/part/mirror/sport.glb", token).body.substr(0, 4), "glTF");
+    for (const char* wrong : {"/glasses/part/mirror/none.glb", "/glasses/part/mirror", "/glasses/x.glb"})
+      EXPECT_EQ(client()->get(wrong, token).status, 404) << wrong;
+    EXPECT_EQ(client()->get("/glasses/light.json").status, 401);
+    const json light = json::parse(client()->get("/glasses/light.json", token).body);
+    const Imager& projector = session_->setup().rig.projectors[1];
+    ASSERT_EQ(light["projectors"].size(), 2u);
+    const json& told = light["projectors"][1];
+    EXPECT_EQ(told["name"], projector.name);
+    const Eigen::Vector3d d(told["outline"][0][0], told["outline"][0][1], 1);
+    const auto px = projector.lens.project(d);
+    ASSERT_TRUE(px);
+    EXPECT_LT((*px - Eigen::Vector2d(-0.5, -0.5)).norm(), 0.05);
+    EXPECT_NEAR(told["world_from_projector"][6].get<double>(),
+                projector.imager_from_world.inverse().translation.z(), 1e-5);
+  });
 }
 
 TEST_F(AServedSession, FourGuestsSeeAnEditWithin200ms) {

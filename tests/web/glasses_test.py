@@ -1,0 +1,324 @@
+"""Glasses on the page: Chromium with an emulated headset (npm package iwer), against a served session of the studio.
+
+    glasses_test.py --room web_glasses_room --out FOLDER
+
+iwer is installed into FOLDER with npm; without npm or its registry the checks that need it are skipped (code 77).
+Screenshots are written to FOLDER.
+"""
+
+import argparse
+import contextlib
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+from browser import Browser, Driver, Failed, wait_for
+
+SKIPPED = 77
+HERE = os.path.dirname(os.path.abspath(__file__))
+IWER = "iwer@2.5.0"
+MOST_REGISTER_S, MOST_OFF_PX, LEAST_IOU, MOST_BYTES = 10.0, 2.0, 0.98, 2000
+SIZE = (1280, 640)  # of both eyes
+IPD_M = 0.063
+
+
+def expect(is_so, what, found=""):
+    if not is_so:
+        raise Failed(f"expected {what}, found {found}")
+
+
+def installed_iwer(folder):
+    """The text of iwer's bundle; None, with the reason printed, if npm cannot fetch it."""
+    bundle = os.path.join(folder, "npm", "node_modules", "iwer", "build", "iwer.min.js")
+    if not os.path.exists(bundle):
+        if not shutil.which("npm"):
+            print("skipped: no npm is installed, which fetches the emulated headset (iwer)")
+            return None
+        prefix = os.path.join(folder, "npm")
+        os.makedirs(prefix, exist_ok=True)
+        command = ["npm", "install", "--prefix", prefix, "--no-audit", "--no-fund", "--fetch-retries", "0", IWER]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=90)
+            why = "" if done.returncode == 0 else done.stderr.strip().splitlines()[-1:]
+        except subprocess.TimeoutExpired:
+            why = "no answer within 90 s"
+        if why or not os.path.exists(bundle):
+            print(f"skipped: npm could not fetch the emulated headset ({IWER}): {why}")
+            return None
+    with open(bundle) as file:
+        return file.read()
+
+
+class Room:
+    """web_glasses_room, and its answers."""
+
+    def __init__(self, program, folder):
+        self.log = open(os.path.join(folder, "room.log"), "w")
+        self.process = subprocess.Popen([program, folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.log, text=True)
+        self.invitation = self._answer()
+        self.url = self.invitation["url"].rstrip("/")
+        with open(os.path.join(folder, "path.json")) as file:
+            self.path = json.load(file)
+
+    def _answer(self):
+        for line in self.process.stdout:
+            if line.startswith("{"):
+                return json.loads(line)
+        raise Failed("expected an answer of the room, found that it ended; see room.log")
+
+    def ask(self, *words):
+        self.process.stdin.write(" ".join(str(word) for word in words) + "\n")
+        self.process.stdin.flush()
+        return self._answer()
+
+    def close(self):
+        self.process.stdin.close()
+        self.process.wait(30)
+        self.log.close()
+
+
+class Mask:
+    """A mask as one large number, first pixel first."""
+
+    def __init__(self, bits, width):
+        self.text, self.bits, self.count, self.width = bits, int(bits, 16), 4 * len(bits), width
+
+    def moved(self, dx, dy):
+        by = dx + dy * self.width
+        return (self.bits >> by) if by >= 0 else (self.bits << -by) & ((1 << self.count) - 1)
+
+    def area(self):
+        return bin(self.bits).count("1")
+
+
+def iou(one, two, dx=0, dy=0):
+    moved = one.moved(dx, dy)
+    either = bin(moved | two.bits).count("1")
+    return bin(moved & two.bits).count("1") / either if either else 1.0
+
+
+def offset_px(drawn, true):
+    """By how many pixels a mask must be moved for the best overlap; sub-pixel by a parabola."""
+    best = max(((iou(drawn, true, dx, dy), dx, dy) for dx in range(-4, 5) for dy in range(-4, 5)))
+    _, x, y = best
+    peak = lambda low, high: (low - high) / 2 / min(-1e-9, low - 2 * best[0] + high)
+    return math.hypot(x + peak(iou(drawn, true, x - 1, y), iou(drawn, true, x + 1, y)),
+                      y + peak(iou(drawn, true, x, y - 1), iou(drawn, true, x, y + 1)))
+
+
+def pose_product(one, two):
+    """a_from_c of a_from_b and b_from_c, each [w, x, y, z, tx, ty, tz]."""
+    (w, x, y, z), (a, b, c, d), p = one[:4], two[:4], two[4:]
+    rotation = [w * a - x * b - y * c - z * d, w * b + x * a + y * d - z * c, w * c - x * d + y * a + z * b, w * d + x * c - y * b + z * a]
+    rows = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    return rotation + [sum(m * v for m, v in zip(row, p)) + t for row, t in zip(rows, one[4:])]
+
+
+class Checks:
+    def __init__(self, room, driver, iwer, out):
+        self.room, self.driver, self.iwer, self.out, self.measured = room, driver, iwer, out, {}
+
+    @contextlib.contextmanager
+    def page(self, *scripts):
+        """The page of a paired guest, with scripts that run before its own."""
+        with contextlib.closing(Browser(self.driver, arguments=("--enable-unsafe-swiftshader", "--use-gl=angle",
+                                                                "--use-angle=swiftshader"))) as browser:
+            browser.resize(*SIZE)
+            for script in scripts:
+                browser.cdp("Page.addScriptToEvaluateOnNewDocument", source=script)
+            browser.open(f"{self.room.url}/#pin={self.room.invitation['pins'][1]}")
+            browser.type("[name=name]", "Ann\ue007")
+            wait_for("a session", lambda: browser.script("return document.body.dataset.status") == "connected")
+            browser.click("#tabs [data-tab=window]")
+            yield browser
+
+    def without_webxr_the_window_is_offered_and_why(self):
+        for script, words in (("", "no immersive-ar"), ("delete Navigator.prototype.xr;", "no WebXR"),
+                              ("Object.defineProperty(window, 'isSecureContext', { value: false });", "only with https")):
+            with self.page(script) as browser:
+                found = wait_for("words about glasses", lambda: browser.text("#glasses-why"))
+                expect(words in found and "window" in found, f"words about {words}", found)
+                expect(not browser.is_shown(browser.find("#glasses")[0]), "no button", "one")
+                expect(browser.find("#window button.main"), "the window's button", "none")
+
+    def state_of(self, browser):
+        return browser.script("return limn_glasses.places.at(-1)?.state ?? 'none'")
+
+    def walk(self, browser, from_s, until_s):
+        """The person walks on from there, and stands at the end. Returns when that begins, and when it ends."""
+        begun = time.time() + 1.0
+        browser.script_async("limn_glasses.walk_on(...args);", self.room.path, begun, from_s, until_s)
+        self.room.ask("walk", f"{begun:.6f}", from_s, until_s)
+        return begun, begun + until_s - from_s
+
+    def stop_at(self, station):
+        """The moment of the walk in the middle of a station."""
+        return self.room.path["look_round_s"] + station * self.room.path["station_s"] + 2
+
+    def the_glasses_find_the_room(self, browser):
+        browser.click("#glasses")
+        wait_for("words on what to do", lambda: browser.text("#glasses-why"))
+        wait_for("a first message", lambda: self.state_of(browser) in ("looking_round", "lost"))
+        time.sleep(1)
+        browser.screenshot(os.path.join(self.out, "looking-round.png"))
+        expect("registered" not in self.state_of(browser), "no place before the head moves", self.state_of(browser))
+        begun, self.there_at = self.walk(browser, 0, self.stop_at(0))
+        wait_for("the place in the room", lambda: self.state_of(browser) == "registered", self.room.path["look_round_s"])
+        at = browser.script("return limn_glasses.places.find(({ state }) => state === 'registered').unix_s")
+        self.measured["registered_s"] = round(at - begun, 2)
+        expect(at - begun <= MOST_REGISTER_S, f"a place within {MOST_REGISTER_S} s", at - begun)
+
+    def true_masks(self, eye, world_from_view):
+        p = eye["projection"]
+        return self.room.ask("mask", eye["width"], eye["height"], p[0], p[5], p[8], p[9], *world_from_view)
+
+    def pose_at(self, station, eye):
+        side = {"left": -1, "right": 1, "none": 0}[eye["eye"]]
+        return self.room.ask("station", station, side * IPD_M / 2)["world_from_view"]
+
+    def parts_are_drawn_where_they_are(self, browser):
+        path, captured = self.room.path, []
+        for station in range(path["stations"]):
+            if station:
+                _, self.there_at = self.walk(browser, self.stop_at(station - 1), self.stop_at(station))
+            time.sleep(max(0, self.there_at + 0.3 - time.time()))
+            for mode in ("full", "rest"):
+                browser.script(f"document.querySelector('[data-glasses-parts={mode}]').click()")
+                time.sleep(0.3)
+                captured += [(station, mode, eye) for eye in browser.script_async("return limn_glasses.capture();")]
+                browser.screenshot(os.path.join(self.out, f"station-{station}-{mode}.png"))
+        offs, rests, rests_in_truth = [], [], []
+        for station, mode, eye in captured:
+            expect(eye.get("world_from_feed"), "a place at each station", eye.get("world_from_feed"))
+            drawn = Mask(eye["bits"], eye["width"])
+            there = Mask(self.true_masks(eye, self.pose_at(station, eye))[mode], eye["width"])
+            self.save(f"station-{station}-{mode}-{eye['eye']}", eye, there)
+            expect(there.area() > 200, "something to see", there.area())
+            if mode == "full":
+                offs.append(offset_px(drawn, there))
+                continue
+            rests_in_truth.append(iou(drawn, there))
+            same_eye = self.true_masks(eye, pose_product(eye["world_from_feed"], eye["feed_from_view"]))
+            rests.append(iou(drawn, Mask(same_eye["rest"], eye["width"])))
+        rounded = lambda values, digits: [round(value, digits) for value in values]
+        rms = math.sqrt(sum(off * off for off in offs) / len(offs))
+        self.measured |= {"off_px": rounded(offs, 2), "off_px_rms": round(rms, 3), "rest_iou": rounded(rests, 4),
+                          "rest_iou_of_the_true_eye": rounded(rests_in_truth, 4)}
+        expect(rms <= MOST_OFF_PX, f"at most {MOST_OFF_PX} px", self.measured)
+        expect(min(rests) >= LEAST_IOU, f"an overlap of {LEAST_IOU}", self.measured)
+
+    def tracked_hands_hide_parts(self, browser):
+        browser.script("document.querySelector('[data-glasses-parts=full]').click()")
+        time.sleep(0.3)
+        before = [Mask(eye["bits"], eye["width"]) for eye in browser.script_async("return limn_glasses.capture();")]
+        browser.script("limn_glasses.raise_a_hand()")
+        time.sleep(0.5)
+        after = [Mask(eye["bits"], eye["width"]) for eye in browser.script_async("return limn_glasses.capture();")]
+        browser.screenshot(os.path.join(self.out, "tracked-hand.png"))
+        hidden = self.measured["hidden_by_hand"] = [round(1 - b.area() / a.area(), 3) for a, b in zip(before, after)]
+        expect(max(hidden) > 0.05 and all(share < 0.95 for share in hidden), "a part that a hand hides in part", hidden)
+        browser.script("limn_glasses.device.primaryInputMode = 'controller'")
+
+    def hands_hide_parts(self, browser):
+        browser.script("document.querySelector('[data-glasses-parts=full]').click(); limn_glasses.hold_a_hand_up()")
+        time.sleep(0.5)
+        for eye in browser.script_async("return limn_glasses.capture();"):
+            true = self.true_masks(eye, pose_product(eye["world_from_feed"], eye["feed_from_view"]))["full"]
+            row, half = eye["width"] // 4, eye["width"] // 8
+            rows = lambda bits: [bits[at:at + row] for at in range(0, len(bits), row)]
+            behind = sum(bin(int(one[:half], 16)).count("1") for one in rows(eye["bits"]))
+            beside = [Mask("".join(one[half:] for one in rows(bits)), eye["width"] // 2) for bits in (eye["bits"], true)]
+            expect(behind == 0, "nothing drawn over the hand", behind)
+            if beside[1].area() > 200:
+                expect(iou(*beside) > 0.9, "the parts beside the hand", iou(*beside))
+        browser.screenshot(os.path.join(self.out, "hand.png"))
+
+    def save(self, name, eye, there):
+        """Both masks as one image: red drawn, green true, so that yellow is right."""
+        width, height = eye["width"], eye["height"]
+        drawn, wanted = (bin(int("1" + bits, 16))[3:] for bits in (eye["bits"], there.text))
+        pixels = bytes(v for a, b in zip(drawn, wanted) for v in (255 * (a == "1"), 255 * (b == "1"), 0))
+        with open(os.path.join(self.out, name + ".ppm"), "wb") as file:
+            file.write(b"P6 %d %d 255\n" % (width, height) + pixels)
+
+    def traffic_is_small(self, browser):
+        one = browser.script("return limn_glasses.traffic()")
+        time.sleep(5)
+        two = browser.script("return limn_glasses.traffic()")
+        frames = two["frames"] - one["frames"]
+        each = sum(two[key] - one[key] for key in ("sent", "received")) / max(1, frames)
+        self.measured["frames_per_s"], self.measured["bytes_a_frame"] = round(frames / 5, 1), round(each)
+        expect(frames > 3 and each <= MOST_BYTES, f"at most {MOST_BYTES} bytes a frame", self.measured)
+
+    def guests(self, browser):
+        return browser.script_async("return (await (await fetch('/api/state')).json()).guests;")
+
+    def sleep_is_seen_by_all(self, browser):
+        browser.script("limn_glasses.hide(true)")
+        wait_for("glasses asleep among the guests", lambda: self.guests(browser)[0].get("glasses") in ("asleep", "lost"))
+        browser.screenshot(os.path.join(self.out, "asleep.png"))
+        browser.script("limn_glasses.hide(false)")
+        self.walk(browser, 0, self.stop_at(0))
+        wait_for("the place again", lambda: self.guests(browser)[0].get("glasses") == "registered", 30)
+
+    def taking_them_off_changes_no_projector(self, browser):
+        before = self.room.ask("projected")["projected"]
+        browser.script("document.querySelector('#glasses').click()")
+        wait_for("a guest without glasses", lambda: "glasses" not in self.guests(browser)[0])
+        expect(self.room.ask("projected")["projected"] == before == self.room.invitation["projected"],
+               "the same projector images", "others")
+        wait_for("the button again", lambda: "Put the glasses on" in browser.text("#glasses"))
+        severe = [entry["message"] for entry in browser.log("browser") if entry["level"] == "SEVERE"]
+        expect(not severe, "no errors on the console", severe)
+
+    def all(self):
+        self._run(self.without_webxr_the_window_is_offered_and_why)
+        if not self.iwer:
+            return SKIPPED
+        with open(os.path.join(HERE, "glasses_in_page.js")) as file:
+            driver = file.read()
+        with self.page(self.iwer, driver) as browser:
+            for check in (self.the_glasses_find_the_room, self.parts_are_drawn_where_they_are, self.tracked_hands_hide_parts, self.hands_hide_parts, self.traffic_is_small,
+                          self.sleep_is_seen_by_all, self.taking_them_off_changes_no_projector):
+                try:
+                    self._run(check, browser)
+                except Failed:
+                    browser.screenshot(os.path.join(self.out, "failed.png"))
+                    print("words:", browser.text("#glasses-why"), "places:",
+                          browser.script("return JSON.stringify(limn_glasses.places.slice(-3))"),
+                          [entry["message"] for entry in browser.log("browser")][-5:])
+                    raise
+        return 0
+
+    def _run(self, check, *given):
+        at = time.monotonic()
+        check(*given)
+        print(f"passed {check.__name__} ({time.monotonic() - at:.1f} s)", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("room", "out"):
+        parser.add_argument(f"--{name}", required=True)
+    options = parser.parse_args()
+    os.makedirs(options.out, exist_ok=True)
+    iwer = installed_iwer(options.out)
+    with contextlib.closing(Room(options.room, options.out)) as room, contextlib.closing(Driver()) as driver:
+        checks = Checks(room, driver, iwer, options.out)
+        try:
+            code = checks.all()
+        except Failed as failure:
+            print(f"FAILED: {failure}\nmeasured: {checks.measured}\nsee {options.out}")
+            return 1
+        print(json.dumps(checks.measured))
+        return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
