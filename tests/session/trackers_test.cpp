@@ -191,11 +191,11 @@ TEST(Trackers, TheExampleIsRead) {
 TEST(Trackers, WrongFilesAreRefusedWithTheKey) {
   const json good = {
       {"name", "a"}, {"protocol", "json"}, {"receive", 7000}, {"bodies", {{"wand", "mirror"}}}};
-  EXPECT_TRUE(feeds_of({good}));
+  EXPECT_TRUE(feeds_of(json::array({good})));
   const auto refusal = [&](const std::string& key, const json& value) {
     json other = good;
     other[key] = value;
-    const auto feeds = feeds_of({other});
+    const auto feeds = feeds_of(json::array({other}));
     return feeds ? "read" : feeds.message();
   };
   EXPECT_NE(refusal("protocol", "vrpn").find("trackers[0].protocol"), std::string::npos);
@@ -208,7 +208,7 @@ TEST(Trackers, WrongFilesAreRefusedWithTheKey) {
   EXPECT_NE(refusal("delay_ms", -1).find("0 to 1000"), std::string::npos);
   EXPECT_NE(refusal("world_from_feed", 1).find("world_from_feed"), std::string::npos);
   EXPECT_NE(refusal("port", 1).find("port"), std::string::npos);
-  EXPECT_NE(feeds_of({good, good}).message().find("another name"), std::string::npos);
+  EXPECT_NE(feeds_of(json::array({good, good})).message().find("another name"), std::string::npos);
 }
 
 // Glasses without a marker: another system states where they are, without a rotation.
