@@ -29,13 +29,14 @@ using nlohmann::json;
 
 constexpr double k_hidden_s = 9, k_end_s = 11;
 
-// People turn and shift the mirror's marker every 0.35 s; a hand covers it from k_hidden_s on.
+// People turn and shift the mirror's marker every 0.35 s. A hand covers it from k_hidden_s on, and under the
+// hand it is moved once more.
 fs::path script_in(const fs::path& folder) {
   json events = json::array();
-  for (int i = 0; i < 30; ++i) {
+  for (int i = 0; i < 25; ++i) {
     const Eigen::Vector3d turn(0.3 * std::sin(1.9 * i), 0.3 * std::sin(2.7 * i + 1), 0.5 * std::sin(1.3 * i));
     const Eigen::Quaterniond q = exp_rotation(turn);
-    events.push_back({{"at_s", 0.35 * (i + 1)},
+    events.push_back({{"at_s", i < 24 ? 0.35 * (i + 1) : k_hidden_s + 0.4},
                       {"move", k_mirror},
                       {"home_from_marker",
                        {{"rotation_wxyz", {q.w(), q.x(), q.y(), q.z()}},
@@ -67,13 +68,10 @@ class Feeder final : public SessionClient {
   void check(const SessionMoment& moment) {
     const ComposedFrame& composed = moment.session.composed();
     const double shown_s = seconds_of(composed.shown_at);
-    if (shown_s < k_hidden_s + 0.5) return;
+    if (shown_s < k_hidden_s + 1.2) return;  // a jump looks like fast motion at first
     for (const Track& track : composed.tracks) {
       if (track.body != "mirror") continue;
       const Pose truth = room_->world_from_marker(MarkerName::parse(k_mirror).value(), shown_s);
-      // A jump is known only after the delay, so only what has stood for a while is compared.
-      const Pose before = room_->world_from_marker(MarkerName::parse(k_mirror).value(), shown_s - 0.3);
-      if ((truth.translation - before.translation).norm() > 1e-6) continue;
       ++compared;
       lost += track.tracking == TrackingState::lost;
       worst_mm = std::max(worst_mm, 1e3 * (track.world_from_body.translation - truth.translation).norm());
@@ -191,11 +189,11 @@ TEST(Trackers, TheExampleIsRead) {
 TEST(Trackers, WrongFilesAreRefusedWithTheKey) {
   const json good = {
       {"name", "a"}, {"protocol", "json"}, {"receive", 7000}, {"bodies", {{"wand", "mirror"}}}};
-  EXPECT_TRUE(feeds_of({good}));
+  EXPECT_TRUE(feeds_of(json::array({good})));
   const auto refusal = [&](const std::string& key, const json& value) {
     json other = good;
     other[key] = value;
-    const auto feeds = feeds_of({other});
+    const auto feeds = feeds_of(json::array({other}));
     return feeds ? "read" : feeds.message();
   };
   EXPECT_NE(refusal("protocol", "vrpn").find("trackers[0].protocol"), std::string::npos);
@@ -208,7 +206,7 @@ TEST(Trackers, WrongFilesAreRefusedWithTheKey) {
   EXPECT_NE(refusal("delay_ms", -1).find("0 to 1000"), std::string::npos);
   EXPECT_NE(refusal("world_from_feed", 1).find("world_from_feed"), std::string::npos);
   EXPECT_NE(refusal("port", 1).find("port"), std::string::npos);
-  EXPECT_NE(feeds_of({good, good}).message().find("another name"), std::string::npos);
+  EXPECT_NE(feeds_of(json::array({good, good})).message().find("another name"), std::string::npos);
 }
 
 // Glasses without a marker: another system states where they are, without a rotation.
