@@ -35,20 +35,19 @@ cv::Mat ScreenComposer::image(const ScreenInput& input, scene::Screen what, proj
   keep_parts_still(input.shown, *part_boxes_, &posed);
   if (what == rest) {
     const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
-    policies_ = projector::updated_policies(policies_, renderer->coverage(posed, rig_->cameras[0]), seconds);
+    policies_ = projector::updated_policies(policies_, renderer->coverage(posed, picture_camera()), seconds);
     treated_at_ = at;
   }
-  const Imager viewer = input.viewer.width > 0 ? input.viewer : rig_->cameras[0];
+  const Imager viewer = input.viewer.width > 0 ? input.viewer : picture_camera();
   const cv::Mat image = composed(behind, posed, viewer, what, policies_, renderer);
   const auto left = scene::left_of_split(*scene_, input.show_state);
   if (!left || what == stereo) return image;
   const auto line =
-      split_line(what == view ? viewer : rig_->cameras[0], posed, prototype_box_, input.show_state.split_mm);
+      split_line(what == view ? viewer : picture_camera(), posed, prototype_box_, input.show_state.split_mm);
   if (!line) return image;
   const scene::PosedScene other = scene::compose_scene(*scene_, *left, input.tracks);
-  const auto policies = what == rest
-                            ? projector::updated_policies({}, renderer->coverage(other, rig_->cameras[0]), 0)
-                            : std::vector<projector::CompositePolicy>();
+  const auto policies = what == rest ? projector::updated_policies({}, renderer->coverage(other, picture_camera()), 0)
+                                     : std::vector<projector::CompositePolicy>();
   return split_along(*line, composed(behind, other, viewer, what, policies, renderer), image);
 }
 
@@ -58,8 +57,10 @@ cv::Mat ScreenComposer::composed(const cv::Mat& behind,
                                  scene::Screen what,
                                  std::span<const projector::CompositePolicy> policies,
                                  projector::Renderer* renderer) const {
-  if (what == scene::Screen::full) return renderer->composite(0, behind, posed, projector::Composite::full);
-  if (what == scene::Screen::rest) return renderer->composite(0, behind, posed, policies);
+  if (what == scene::Screen::full)
+    return renderer->composite(rig_->first_visible_camera(), behind, posed, projector::Composite::full);
+  if (what == scene::Screen::rest)
+    return renderer->composite(rig_->first_visible_camera(), behind, posed, policies);
   if (what == scene::Screen::view) return renderer->view(viewer, posed, k_background);
   const double half = 0.5e-3 * options_.stereo_mm;
   const cv::Mat eyes[2] = {renderer->view(moved_eye(viewer, -half), posed, k_background),

@@ -19,10 +19,10 @@ namespace limn::session {
 
 /// The input for a screen's image.
 struct ScreenInput {
-  const Frame& frame;  ///< camera 0's newest
+  const Frame& frame;  ///< the newest of Percepts::picture_camera
   const scene::ShowState& show_state;
   std::vector<Track> tracks;  ///< at that frame's stamp, assigned to slots as the show state pairs markers
-  const Imager& viewer;       ///< viewpoint that `view` parts are drawn for; width 0: camera 0's
+  const Imager& viewer;       ///< viewpoint that `view` parts are drawn for; width 0: that camera's
   const scene::PosedScene& shown;  ///< the scene as it is projected; parts at rest are drawn at its poses
 };
 
@@ -41,6 +41,8 @@ class ScreenComposer {
   cv::Mat image(const ScreenInput& input, scene::Screen what, projector::Renderer* renderer);
 
  private:
+  // The camera whose images are shown. A rig without cameras has no images.
+  const Imager& picture_camera() const { return rig_->cameras[rig_->first_visible_camera()]; }
   cv::Mat composed(const cv::Mat& behind,
                    const scene::PosedScene& posed,
                    const Imager& viewer,
