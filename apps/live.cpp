@@ -60,6 +60,12 @@ Status check_options(const LiveOptions& options) {
   if (!(options.extrapolate_s > 0 && options.extrapolate_s <= 5))
     return usage_error("--extrapolate: expected seconds over 0 and at most 5, found {}.",
                        options.extrapolate_s);
+  if (options.triple_pose == tracker::TriplePose::triangle &&
+      options.prediction == tracker::Prediction::filtered)
+    return usage_error(
+        "--triple-pose triangle: expected --prediction hold or linear with it, found filtered, which uses "
+        "the "
+        "balls' centres themselves and no pose of one image.");
   if (!options.devices.empty() && options.rig.empty())
     return usage_error("--devices: expected --rig and --scene with it, found neither.");
   if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
@@ -152,6 +158,7 @@ Status set_up(const LiveOptions& options, session::SessionSetup* setup) {
   setup->paint.prediction = options.prediction;
   setup->paint.marker_light = options.marker_light;
   setup->paint.refill = options.refill;
+  setup->watch.triple_pose = options.triple_pose;
   setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
   setup->paint.motion = setup->watch.motion;
   return {};

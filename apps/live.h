@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/result.h"
+#include "tracker/balls/constellation_filter.h"
 #include "tracker/marker_light.h"
 #include "tracker/predict.h"
 
@@ -27,6 +28,7 @@ struct LiveOptions {
   bool window = false;
   tracker::Prediction prediction = tracker::Prediction::filtered;
   tracker::MarkerLight marker_light = tracker::MarkerLight::keep_out;
+  tracker::TriplePose triple_pose = tracker::TriplePose::refined;
   bool refill = true;          ///< Other projectors fill shadows.
   double extrapolate_s = 0.3;  ///< How long unseen markers are extrapolated.
   std::string osc;             ///< PORT or ADDRESS:PORT at which OSC is received; empty: none.

@@ -244,7 +244,7 @@ cv::Mat FrameComposer::screen(const Percepts& percepts,
                               const scene::ShowState& show_state,
                               scene::Screen what) {
   if (percepts.frames.empty()) return {};
-  ScreenInput input{percepts.frames[percepts.picture_camera], show_state,
+  ScreenInput input{percepts.frames[percepts.screen_camera], show_state,
                     scene::assign_tracks(subject_->scene, show_state, tracks), viewpoints_.selected().viewer,
                     fading_.faded()};
   keep_still(fading_.faded().world_from_prototype, prototype_box_, &input.tracks);

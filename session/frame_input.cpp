@@ -13,8 +13,8 @@ std::vector<Track> tracks_at(const Percepts& percepts, const ComposeOptions& opt
 }  // namespace
 
 Prediction predicted_at_capture(const Percepts& percepts, const ComposeOptions& options) {
-  const Frame picture = percepts.frames.empty() ? Frame{} : percepts.frames[percepts.picture_camera];
-  const Stamp image_at = picture.captured_at != Stamp{} ? picture.captured_at : percepts.captured_at;
+  const Frame frame = percepts.frames.empty() ? Frame{} : percepts.frames[percepts.screen_camera];
+  const Stamp image_at = frame.captured_at != Stamp{} ? frame.captured_at : percepts.captured_at;
   Prediction out;
   out.at_capture = tracks_at(percepts, options, percepts.captured_at);
   out.at_image = image_at == percepts.captured_at ? out.at_capture : tracks_at(percepts, options, image_at);

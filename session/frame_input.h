@@ -47,7 +47,7 @@ struct FrameTimes {
 struct Prediction {
   /// At the newest camera frame. They decide whether a pin's marker has moved.
   std::vector<Track> at_capture;
-  /// At the newest image of Percepts::picture_camera, which screens and tablets draw over. With several
+  /// At the newest image of Percepts::screen_camera, which screens and tablets draw over. With several
   /// cameras this differs from at_capture: drawn for any other moment, parts would lie beside what that image
   /// shows.
   std::vector<Track> at_image;

@@ -7,7 +7,6 @@
 #include "core/image_io.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
-#include "tracker/balls/constellation_filter.h"
 #include "tracker/body_correspondences.h"
 #include "tracker/camera_encoding.h"
 #include "tracker/family.h"
@@ -98,7 +97,7 @@ Result<Perception> Perception::create(const scene::Scene& scene,
   out.used_at_.resize(scene.controls.size());
   out.percepts_.frames.resize(rig.cameras.size());
   out.percepts_.detections.resize(rig.cameras.size());
-  out.percepts_.picture_camera = rig.first_visible_camera();
+  out.percepts_.screen_camera = rig.first_visible_camera();
   if (!out.constellations_.empty()) out.percepts_.balls.resize(rig.cameras.size());
   return out;
 }
@@ -138,7 +137,8 @@ void Perception::filter(std::span<const std::size_t> cameras) {
       bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
   const Stamp at = percepts_.captured_at;
   auto motions = tracker::observed(percepts_.motions, bodies, views, at, options_.motion);
-  std::ranges::move(tracker::observed(percepts_.motions, constellations_, ball_views, at, options_.motion),
+  std::ranges::move(tracker::observed(percepts_.motions, constellations_, ball_views, at, options_.motion,
+                                      options_.triple_pose),
                     std::back_inserter(motions));
   percepts_.motions = std::move(motions);
   percepts_.tracks =

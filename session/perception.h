@@ -11,6 +11,7 @@
 #include "core/track.h"
 #include "scene/scene.h"
 #include "tracker/balls/ball_finder.h"
+#include "tracker/balls/constellation_filter.h"
 #include "tracker/body_filter.h"
 #include "tracker/detector.h"
 #include "tracker/gesture.h"
@@ -42,7 +43,7 @@ struct Percepts {
   std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
   std::vector<std::vector<tracker::Detection>> detections;  ///< in these frames, one list per camera
   std::vector<std::vector<tracker::Ball>> balls;  ///< in these frames; empty when the scene has none
-  std::size_t picture_camera = 0;  ///< the first camera that sees visible light: screens show its frames
+  std::size_t screen_camera = 0;  ///< the first camera that sees visible light: screens show its frames
   std::vector<tracker::BodyFilter> motions;
   std::vector<LooseMarker> loose;  ///< tracked loose markers, the one that is still for longest first
   std::vector<ControlUse> uses;    ///< control uses of this moment
@@ -57,6 +58,7 @@ struct PerceptionOptions {
   /// Higher is faster and finds new markers later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
+  tracker::TriplePose triple_pose = tracker::TriplePose::refined;
   int most_loose = 8;  ///< at most so many loose markers; further ones are ignored
 };
 

@@ -35,19 +35,20 @@ cv::Mat ScreenComposer::image(const ScreenInput& input, scene::Screen what, proj
   keep_parts_still(input.shown, *part_boxes_, &posed);
   if (what == rest) {
     const double seconds = treated_at_ == Stamp{} ? 0 : std::max(0.0, seconds_between(treated_at_, at));
-    policies_ = projector::updated_policies(policies_, renderer->coverage(posed, picture_camera()), seconds);
+    policies_ = projector::updated_policies(policies_, renderer->coverage(posed, screen_camera()), seconds);
     treated_at_ = at;
   }
-  const Imager viewer = input.viewer.width > 0 ? input.viewer : picture_camera();
+  const Imager viewer = input.viewer.width > 0 ? input.viewer : screen_camera();
   const cv::Mat image = composed(behind, posed, viewer, what, policies_, renderer);
   const auto left = scene::left_of_split(*scene_, input.show_state);
   if (!left || what == stereo) return image;
   const auto line =
-      split_line(what == view ? viewer : picture_camera(), posed, prototype_box_, input.show_state.split_mm);
+      split_line(what == view ? viewer : screen_camera(), posed, prototype_box_, input.show_state.split_mm);
   if (!line) return image;
   const scene::PosedScene other = scene::compose_scene(*scene_, *left, input.tracks);
-  const auto policies = what == rest ? projector::updated_policies({}, renderer->coverage(other, picture_camera()), 0)
-                                     : std::vector<projector::CompositePolicy>();
+  const auto policies = what == rest
+                            ? projector::updated_policies({}, renderer->coverage(other, screen_camera()), 0)
+                            : std::vector<projector::CompositePolicy>();
   return split_along(*line, composed(behind, other, viewer, what, policies, renderer), image);
 }
 

@@ -19,7 +19,7 @@ namespace limn::session {
 
 /// The input for a screen's image.
 struct ScreenInput {
-  const Frame& frame;  ///< the newest of Percepts::picture_camera
+  const Frame& frame;  ///< the newest of Percepts::screen_camera
   const scene::ShowState& show_state;
   std::vector<Track> tracks;  ///< at that frame's stamp, assigned to slots as the show state pairs markers
   const Imager& viewer;       ///< viewpoint that `view` parts are drawn for; width 0: that camera's
@@ -42,7 +42,7 @@ class ScreenComposer {
 
  private:
   // The camera whose images are shown. A rig without cameras has no images.
-  const Imager& picture_camera() const { return rig_->cameras[rig_->first_visible_camera()]; }
+  const Imager& screen_camera() const { return rig_->cameras[rig_->first_visible_camera()]; }
   cv::Mat composed(const cv::Mat& behind,
                    const scene::PosedScene& posed,
                    const Imager& viewer,

@@ -464,7 +464,7 @@ void TabletView::update_session(const session::Session& session) {
                       .show_state = session.show_state(),
                       .tracks = session.prediction().at_image,
                       .paint = session.setup().paint,
-                      .room = percepts.frames.empty() ? Frame{} : percepts.frames[percepts.picture_camera],
+                      .room = percepts.frames.empty() ? Frame{} : percepts.frames[percepts.screen_camera],
                       .follows = session.composed().follows});
   const std::lock_guard lock(impl_->mutex);
   impl_->newest_snapshot = std::move(snapshot);

@@ -98,5 +98,30 @@ TEST(BallSession, OnlyCamerasForInfraredLightLeaveTheLightAsItIs) {
   EXPECT_LT(dark_on_badge(test::test_folder(), "infrared"), 100);
 }
 
+TEST(BallSession, ThePapersTriangleCarriesATripleToo) {
+  const fs::path folder = test::test_folder();
+  json world = world_json();
+  world["cameras"].erase(0);  // one camera sees the three balls
+  apps::LiveOptions options = options_for(folder, world, 1.2);
+  options.record = folder / "recording";
+  options.triple_pose = tracker::TriplePose::triangle;
+  const Status refused = apps::run_live(options);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.message().find("--triple-pose"), std::string::npos) << refused.message();
+  options.prediction = tracker::Prediction::linear;
+  const Status lived = apps::run_live(options);
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  const double placement_mm = read_json(folder / "out/session.json").at("placement_mm").at("median");
+  EXPECT_GT(placement_mm, 0);
+  EXPECT_LT(placement_mm, 2);
+  EXPECT_EQ(read_json(folder / "recording/session.json").at("triple_pose"), "triangle");
+  apps::ReplayOptions replay;
+  replay.session = folder / "recording";
+  replay.out = folder / "replayed";
+  const Status replayed = apps::run_replay(replay);
+  EXPECT_TRUE(replayed.ok()) << replayed.message();
+  EXPECT_EQ(lines_of(folder / "out/poses.csv"), lines_of(folder / "replayed/poses.csv"));
+}
+
 }  // namespace
 }  // namespace limn::session

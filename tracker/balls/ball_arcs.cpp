@@ -13,7 +13,8 @@ namespace {
 constexpr std::size_t k_most_circles = 4;
 // Boundaries run along pixels, which is an error of .3 px; shade on the sphere moves them, too.
 constexpr double k_off_px = 0.6, k_off_share = 0.025;
-constexpr double k_least_shown = 0.6, k_proposed_share = 0.4;  // of a refined circle, and of a first one
+// Shares of a circle that the boundary must run along: a refined one, and a first proposal.
+constexpr double k_least_shown = 0.6, k_proposed_share = 0.4;
 // Lengths of the arcs that propose circles, as shares of the boundary.
 constexpr std::array<double, 2> k_arcs = {0.2, 0.34};
 constexpr int k_refinements = 3;
@@ -78,7 +79,7 @@ class CircleSearch {
     const std::size_t count = boundary_.size();
     for (const double share : k_arcs) {
       const auto step = static_cast<std::size_t>(0.5 * share * static_cast<double>(count));
-      for (std::size_t i = 0; step > 0 && i < count; ++i) {
+      for (std::size_t i = 0; step > 0 && i < count; i += 2) {
         const std::size_t k = (i + step) % count, n = (i + 2 * step) % count;
         if (is_used_[i] || is_used_[k] || is_used_[n]) continue;
         const auto circle = fitted(std::array{boundary_[i], boundary_[k], boundary_[n]});

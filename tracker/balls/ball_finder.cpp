@@ -19,6 +19,8 @@ constexpr double k_most_rms_px = 0.5, k_most_rms_share = 0.03;
 // A boundary that may show parts of outlines: least share of its box, least area (of a square around the
 // smallest sphere) and largest size (in largest spheres).
 constexpr double k_least_part_fill = 0.3, k_least_part = 0.4, k_most_part = 3;
+// Least area over the squared number of cracks along the boundary: .049 for a circle, .012 for four in a row.
+constexpr double k_least_compactness = 0.011;
 constexpr double k_beside_px = 5;  // what lies this close beside an outline disturbs its fit
 
 bool is_round(const Contours::Extent& extent, const Contours::Box& box, const BallFinderOptions& options) {
@@ -71,11 +73,13 @@ std::optional<BallOutline> BallFinder::outline(const Contours::Extent& extent, c
 // the same angle.
 std::vector<BallOutline> BallFinder::partial_outlines(const Contours::Extent& extent, const Lens& lens) {
   const Contours::Box box = contours_.box();
+  const auto cracks = static_cast<double>(extent.count);
   if (!(extent.area > k_least_part_fill * box.width * box.height) ||
+      !(extent.area > k_least_compactness * cracks * cracks) ||
       !(extent.area > k_least_part * options_.min_diameter_px * options_.min_diameter_px) ||
       !(std::max(box.width, box.height) < k_most_part * options_.max_diameter_px))
     return {};
-  contours_.find_corners(static_cast<double>(extent.count), 2);  // the points are readable after this
+  contours_.find_corners(cracks, 2);  // the points are readable after this
   const std::size_t count = contours_.size(), used = std::min(count, k_most_points);
   const Eigen::Vector2d middle = 0.5 * (contours_.point(0) + contours_.point(count / 2));
   const auto d_middle = lens.unproject(middle);

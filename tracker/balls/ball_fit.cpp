@@ -47,6 +47,8 @@ constexpr double k_most_residual_share = 0.08;  // RMS residual over the contras
 constexpr double k_noise_levels = 3;
 constexpr double k_least_sector_share = 0.15;  // contrast of the weaker sectors, as share of the mean
 constexpr int k_most_weak_sectors = 3;
+constexpr double k_partial_share = 0.5;   // these limits for an outline that is shown in part
+constexpr double k_most_disturbed = 2.5;  // a part's residual over the median of all parts
 constexpr double k_most_stddev_px = 0.3;
 // The radius is known to this at best: pixels and blur are not quite Gaussian.
 constexpr double k_systematic_radius_px = 0.03;
@@ -411,13 +413,35 @@ Evidence evidence_of(const Pixels& pixels,
   return evidence;
 }
 
+// Without the parts whose residuals are much larger than most: something lies beside the outline there.
+template <class Pixels, class State>
+OutlineParts undisturbed(const Pixels& pixels, const State& state, const OutlineParts& shown) {
+  std::array<double, k_outline_parts> squares{}, count{};
+  for (const auto& pixel : pixels) {
+    const std::size_t part = outline_part(pixel.px - state.centre_px);
+    const double r = pixel.light - model_of(pixel, state).value;
+    squares[part] += r * r, ++count[part];
+  }
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < k_outline_parts; ++i)
+    if (shown[i] && count[i] > 0) sizes.push_back(std::sqrt(squares[i] / count[i]));
+  if (sizes.empty()) return shown;
+  const double most = std::max(k_noise_levels, k_most_disturbed * median(std::move(sizes)));
+  OutlineParts kept = shown;
+  for (std::size_t i = 0; i < k_outline_parts; ++i)
+    if (count[i] > 0 && std::sqrt(squares[i] / count[i]) > most) kept.reset(i);
+  return kept;
+}
+
 bool shows_sphere(const Evidence& evidence, double radius_px, double min_contrast) {
   const double contrast = std::abs(evidence.contrast);
+  // An arc suits a sphere more easily than a whole outline does, so it must suit it better.
+  const double strictness = evidence.sectors == k_sectors ? 1 : k_partial_share;
   return evidence.sectors >= k_least_sectors && contrast >= min_contrast &&
          evidence.weak_sectors * static_cast<int>(k_sectors) <=
              k_most_weak_sectors * static_cast<int>(evidence.sectors) &&
-         evidence.bumps_px <= k_most_bumps_px + k_most_bumps_share * radius_px &&
-         evidence.residual <= k_noise_levels + k_most_residual_share * contrast;
+         evidence.bumps_px <= strictness * (k_most_bumps_px + k_most_bumps_share * radius_px) &&
+         evidence.residual <= k_noise_levels + strictness * k_most_residual_share * contrast;
 }
 
 }  // namespace
@@ -433,8 +457,9 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
   Normal information;
   double scale = 1;
   const HuberLoss loss{k_huber};
+  OutlineParts shown = start.shown;
   for (int round = 0; round < k_rounds; ++round) {
-    if (!collect(grey, lens, state, start.shown)) return std::nullopt;
+    if (!collect(grey, lens, state, shown)) return std::nullopt;
     Problem problem{.lens = lens, .pixels = pixels_, .loss = {0}, .state = state};
     if (!problem.fit_light()) return std::nullopt;
     if (round > 0) {
@@ -451,9 +476,11 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
     information = problem.normal;
     if ((state.centre_px - start.centre_px).norm() > 1 + k_most_shift_share * start.radius_px)
       return std::nullopt;
+    const bool is_partial = !start.shown.all();
+    if (round == 0 && is_partial) shown = undisturbed(pixels_, state, shown);
     if (round > 0 && std::abs(state.blur_px - blur_before) < k_same_blur_share * state.blur_px) break;
   }
-  const Evidence evidence = evidence_of(pixels_, state, start.shown, loss, scale);
+  const Evidence evidence = evidence_of(pixels_, state, shown, loss, scale);
   if (!shows_sphere(evidence, state.radius_px, min_contrast)) return std::nullopt;
   const Normal covariance = evidence.agreement * information.ldlt().solve(Normal::Identity());
   const Eigen::Matrix2d centre = covariance.topLeftCorner<2, 2>();

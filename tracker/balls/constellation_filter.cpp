@@ -1,7 +1,12 @@
 #include "tracker/balls/constellation_filter.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <optional>
+
+#include "tracker/balls/three_point_pose.h"
+#include "tracker/triangle_pose.h"
 
 namespace limn::tracker {
 namespace {
@@ -84,13 +89,42 @@ class BallEvidence : public BodyEvidence {
   std::span<const ConstellationFit> fits_;
 };
 
+// The pose of three balls by the paper's triangle: the balls' places in the camera's frame are where the rays
+// of their centres come nearest to the balls of the pose that the image suits.
+std::optional<Pose> triangle_fix(const Constellation& constellation,
+                                 std::span<const BallView> views,
+                                 std::span<const ConstellationFit> fits,
+                                 const Pose& world_from_body) {
+  const auto nearest = std::ranges::min_element(fits, {}, [&](const ConstellationFit& fit) {
+    return angle_between(fit.fit.world_from_body.rotation, world_from_body.rotation);
+  });
+  if (constellation.p_balls.size() != 3 || !is_weak(*nearest)) return std::nullopt;
+  const BallView& view = views[nearest->matches.front().view];
+  std::array<Eigen::Vector3d, 3> p_body, d_camera;
+  for (std::size_t i = 0; i < 3; ++i) {
+    p_body[i] = constellation.p_balls[nearest->matches[i].in_constellation];
+    d_camera[i] = view.balls[nearest->matches[i].ball].d_centre;
+  }
+  const Pose camera_from_body = view.camera->imager_from_world * nearest->fit.world_from_body;
+  const std::vector<Pose> poses = three_point_poses(p_body, d_camera);
+  if (poses.empty()) return std::nullopt;
+  const Pose solution = *std::ranges::min_element(
+      poses, {}, [&](const Pose& pose) { return angle_between(pose.rotation, camera_from_body.rotation); });
+  Triangle in_camera;
+  for (std::size_t i = 0; i < 3; ++i) in_camera[i] = (solution * p_body[i]).dot(d_camera[i]) * d_camera[i];
+  const auto camera_from_triangle = pose_from_triangles(p_body, in_camera);
+  if (!camera_from_triangle) return std::nullopt;
+  return view.camera->imager_from_world.inverse() * *camera_from_triangle;
+}
+
 }  // namespace
 
 std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
                                  std::span<const Constellation> constellations,
                                  std::span<const BallView> views,
                                  Stamp captured_at,
-                                 const MotionModel& model) {
+                                 const MotionModel& model,
+                                 TriplePose triple_pose) {
   std::vector<const BodyFilter*> before;
   std::vector<ExpectedPoses> expected;
   for (const Constellation& constellation : constellations) {
@@ -105,6 +139,11 @@ std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
     auto after = advanced(before[i], constellations[i].name, seen, captured_at, model);
     if (!after) continue;
     after->images_to_confirm = images_to_confirm(before[i], *after, expected[i], fits[i]);
+    if (triple_pose == TriplePose::triangle && after->measured_at == captured_at && !fits[i].empty()) {
+      Fix& fix = after->fixes.back();
+      fix.world_from_body =
+          triangle_fix(constellations[i], views, fits[i], fix.world_from_body).value_or(fix.world_from_body);
+    }
     motions.push_back(std::move(*after));
   }
   return motions;
