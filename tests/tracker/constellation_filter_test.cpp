@@ -17,7 +17,8 @@ TEST(ConstellationFilter, CrossingConstellationsKeepTheirIdentities) {
   EXPECT_EQ(count.swapped, 0);
   EXPECT_EQ(count.elsewhere, 0);
   EXPECT_GT(count.visible, 400);  // the hands are near each other: balls hide each other half of the time
-  EXPECT_GT(count.reported, count.visible * 4 / 10);  // after a hidden ball, ten images confirm a triangle
+  // A triangle that is seen again after a moment is confirmed by two images, a new one by ten.
+  EXPECT_GT(count.reported, count.visible * 13 / 20);
 }
 
 // Ten images confirm three balls in one camera; four balls need none.

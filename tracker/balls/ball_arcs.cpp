@@ -14,7 +14,7 @@ constexpr std::size_t k_most_circles = 4;
 // Boundaries run along pixels, which is an error of .3 px; shade on the sphere moves them, too.
 constexpr double k_off_px = 0.6, k_off_share = 0.025;
 // Shares of a circle that the boundary must run along: a refined one, and a first proposal.
-constexpr double k_least_shown = 0.6, k_proposed_share = 0.4;
+constexpr double k_least_shown = 0.56, k_proposed_share = 0.4;
 // Lengths of the arcs that propose circles, as shares of the boundary.
 constexpr std::array<double, 2> k_arcs = {0.2, 0.34};
 constexpr int k_refinements = 3;

@@ -47,7 +47,12 @@ constexpr double k_most_residual_share = 0.08;  // RMS residual over the contras
 constexpr double k_noise_levels = 3;
 constexpr double k_least_sector_share = 0.15;  // contrast of the weaker sectors, as share of the mean
 constexpr int k_most_weak_sectors = 3;
-constexpr double k_partial_share = 0.5;   // these limits for an outline that is shown in part
+constexpr double k_partial_share = 0.4;   // these limits for an outline that is shown in part
+constexpr double k_partial_variance = 2;  // an arc shows less of what disturbs it
+constexpr double k_least_disturbed = 4;   // levels
+constexpr int k_most_fits = 3;            // each leaves out the parts that disturbed the one before
+constexpr std::size_t k_least_kept = 17;  // parts; fewer suit what is no sphere, too
+constexpr int k_most_gaps = 2;            // what hides a part leaves one gap; what is no sphere has more
 constexpr double k_most_disturbed = 2.5;  // a part's residual over the median of all parts
 constexpr double k_most_stddev_px = 0.3;
 // The radius is known to this at best: pixels and blur are not quite Gaussian.
@@ -426,11 +431,19 @@ OutlineParts undisturbed(const Pixels& pixels, const State& state, const Outline
   for (std::size_t i = 0; i < k_outline_parts; ++i)
     if (shown[i] && count[i] > 0) sizes.push_back(std::sqrt(squares[i] / count[i]));
   if (sizes.empty()) return shown;
-  const double most = std::max(k_noise_levels, k_most_disturbed * median(std::move(sizes)));
+  const double most = std::max(k_least_disturbed, k_most_disturbed * median(std::move(sizes)));
   OutlineParts kept = shown;
   for (std::size_t i = 0; i < k_outline_parts; ++i)
     if (count[i] > 0 && std::sqrt(squares[i] / count[i]) > most) kept.reset(i);
   return kept;
+}
+
+// How many runs of parts are left out.
+int gaps_in(const OutlineParts& shown) {
+  int gaps = 0;
+  for (std::size_t i = 0; i < k_outline_parts; ++i)
+    gaps += !shown[i] && shown[(i + k_outline_parts - 1) % k_outline_parts];
+  return gaps;
 }
 
 bool shows_sphere(const Evidence& evidence, double radius_px, double min_contrast) {
@@ -450,6 +463,23 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
                                     const Lens& lens,
                                     const BallOutline& start,
                                     double min_contrast) {
+  std::optional<Ball> ball;
+  BallOutline outline = start;
+  for (int i = 0; i < k_most_fits; ++i) {
+    OutlineParts kept = outline.shown;
+    const auto better = fit_shown(grey, lens, outline, min_contrast, &kept);
+    if (better) ball = better;
+    if (kept == outline.shown || kept.count() < k_least_kept || gaps_in(kept) > k_most_gaps) break;
+    outline.shown = kept;
+  }
+  return ball;
+}
+
+std::optional<Ball> BallFitter::fit_shown(const cv::Mat& grey,
+                                          const Lens& lens,
+                                          const BallOutline& start,
+                                          double min_contrast,
+                                          OutlineParts* undisturbed_parts) {
   State state{.centre_px = start.centre_px, .radius_px = start.radius_px, .blur_px = k_first_blur_px};
   if (!start.centre_px.allFinite() || !(start.radius_px > k_smallest_radius_px) || !state.settle(lens))
     return std::nullopt;
@@ -457,9 +487,8 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
   Normal information;
   double scale = 1;
   const HuberLoss loss{k_huber};
-  OutlineParts shown = start.shown;
   for (int round = 0; round < k_rounds; ++round) {
-    if (!collect(grey, lens, state, shown)) return std::nullopt;
+    if (!collect(grey, lens, state, start.shown)) return std::nullopt;
     Problem problem{.lens = lens, .pixels = pixels_, .loss = {0}, .state = state};
     if (!problem.fit_light()) return std::nullopt;
     if (round > 0) {
@@ -476,13 +505,13 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
     information = problem.normal;
     if ((state.centre_px - start.centre_px).norm() > 1 + k_most_shift_share * start.radius_px)
       return std::nullopt;
-    const bool is_partial = !start.shown.all();
-    if (round == 0 && is_partial) shown = undisturbed(pixels_, state, shown);
     if (round > 0 && std::abs(state.blur_px - blur_before) < k_same_blur_share * state.blur_px) break;
   }
-  const Evidence evidence = evidence_of(pixels_, state, shown, loss, scale);
+  *undisturbed_parts = undisturbed(pixels_, state, start.shown);
+  const Evidence evidence = evidence_of(pixels_, state, start.shown, loss, scale);
   if (!shows_sphere(evidence, state.radius_px, min_contrast)) return std::nullopt;
-  const Normal covariance = evidence.agreement * information.ldlt().solve(Normal::Identity());
+  const double doubt = evidence.sectors == k_sectors ? 1 : k_partial_variance;
+  const Normal covariance = doubt * evidence.agreement * information.ldlt().solve(Normal::Identity());
   const Eigen::Matrix2d centre = covariance.topLeftCorner<2, 2>();
   if (!centre.allFinite() || !(centre.trace() < 2 * k_most_stddev_px * k_most_stddev_px) ||
       !(centre.determinant() > 0) || !(covariance(2, 2) > 0))

@@ -28,9 +28,10 @@ class BallFitter {
   /// As for EdgeRefiner: positions are computed in linear light.
   explicit BallFitter(Encoding encoding = Encoding::linear);
 
-  /// Only the pixels at the outline's shown parts are used; they must be at least 7 sixteenths of it.
-  /// nullopt when the pixels do not show a sphere's outline of at least `min_contrast` (of 255) near `start`:
-  /// the outline is not a cone, it has no edge on much of its length, or it leaves the image.
+  /// Only the pixels at the outline's shown parts are used; they must be at least 7 sixteenths of it, and
+  /// those that something beside the outline disturbs are left out, too. nullopt when the pixels do not show
+  /// a sphere's outline of at least `min_contrast` (of 255) near `start`: the outline is not a cone, it has
+  /// no edge on much of its length, or it leaves the image.
   std::optional<Ball> fit(const cv::Mat& grey,
                           const Lens& lens,
                           const BallOutline& start,
@@ -48,6 +49,12 @@ class BallFitter {
   EdgeRefiner encoding_;  // for its table of light
   std::vector<Pixel> pixels_;
 
+  // Fits the shown parts; says which of them nothing disturbs.
+  std::optional<Ball> fit_shown(const cv::Mat& grey,
+                                const Lens& lens,
+                                const BallOutline& start,
+                                double min_contrast,
+                                OutlineParts* undisturbed_parts);
   bool collect(const cv::Mat& grey, const Lens& lens, const State& state, const OutlineParts& shown);
 };
 

@@ -14,15 +14,22 @@ namespace {
 // Three balls in one camera are reported when this many images agree: those of two bodies that move do not
 // stay as far apart.
 constexpr int k_images_to_confirm = 10;
+// So many suffice where the same balls were reported a moment before: they are found only where they are
+// expected.
+constexpr int k_images_to_confirm_again = 2;
 // How far a body may be from where its motion leads to: a part for the prediction's error, and one for what a
 // hand does while the body is not seen.
 constexpr double k_spread_m = 0.01, k_spread_m_per_s = 0.6, k_spread_turn = 0.05, k_spread_turn_per_s = 3;
+// For so long the filter's motion still leads to the right place: the spread grows with the square of the
+// time.
+constexpr double k_predicted_s = 0.15;
 
 ExpectedPoses expected_of(const BodyFilter* known, Stamp at, const MotionModel& model) {
   if (!known) return {};
   const double unseen = std::max(0.0, seconds_between(known->measured_at, at));
-  return {expected_poses(*known, at, model), k_spread_m + k_spread_m_per_s * unseen,
-          k_spread_turn + k_spread_turn_per_s * unseen};
+  const double unforeseen = unseen * std::min(1.0, unseen / k_predicted_s);
+  return {expected_poses(*known, at, model), k_spread_m + k_spread_m_per_s * unforeseen,
+          k_spread_turn + k_spread_turn_per_s * unforeseen};
 }
 
 // After a step: a body that has just been found among three balls, or again after a while, must be confirmed;
@@ -33,8 +40,9 @@ int images_to_confirm(const BodyFilter* before,
                       std::span<const ConstellationFit> fits) {
   if (before && after.measured_at == before->measured_at) return before->images_to_confirm;
   if (!is_weak(fits.front())) return 0;
-  const bool is_new = !before || after.fixes.size() == 1 || !is_firm(expected);
-  return is_new ? k_images_to_confirm : std::max(0, before->images_to_confirm - 1);
+  if (!before || after.fixes.size() == 1) return k_images_to_confirm;
+  if (is_firm(expected)) return std::max(0, before->images_to_confirm - 1);
+  return before->images_to_confirm > 0 ? k_images_to_confirm : k_images_to_confirm_again;
 }
 
 // The explanations of one constellation as evidence for its pose. A minimum's chi-square includes the sizes
