@@ -159,6 +159,7 @@ Status calibrate_virtually(const CalibrateOptions& asked) {
   const std::vector<Imager> cameras = rig.world().rig.cameras;
   LIMN_TRY(const calib::CaptureSet captures,
            wizard::plan_virtual_captures(plan, rig, options.out / "captures"));
+  LIMN_TRY_STATUS(calib::check_spectra(captures));
   ImageWriter writer;
   rig.remove_prototype();
   std::atomic<wizard::WizardWish> wish = wizard::WizardWish::none;
@@ -205,9 +206,10 @@ Status calibrate_on(const CalibrateOptions& options,
                     const Result<device::Desktop>& desktop) {
   const auto board = calib::Board::parse(options.board);
   if (!board) return usage_error("--board: {}", board.message());
-  const calib::CaptureSet captures =
-      calib::plan_captures(options.out / "captures", wizard::captured_devices(devices.cameras),
-                           wizard::captured_devices(devices.projectors), *board, options.code);
+  const calib::CaptureSet captures = calib::plan_captures(
+      options.out / "captures", wizard::captured_devices(devices.cameras, devices.infrared),
+      wizard::captured_devices(devices.projectors), *board, options.code);
+  LIMN_TRY_STATUS(calib::check_spectra(captures));
   const calib::CapturedDevice& first = captures.cameras.front();
   const Imager assumed = wizard::assumed_camera(first.name, first.width, first.height);
   const std::vector<Pose> poses = wizard::guided_poses(assumed, *board);

@@ -875,6 +875,9 @@ void add_live(CLI::App& app, Run& run) {
                     "Open the operator's window: images, devices, parts, looks, telemetry, keys");
   add_choice(command, "--prediction", &options->prediction, tracker::k_predictions,
              "How poses are predicted for the moment when the light is shown: hold, linear or filtered");
+  add_choice(command, "--triple-pose", &options->triple_pose, tracker::k_triple_poses,
+             "Pose of three balls in one image: refined, or triangle (the method of the 2011 paper; with "
+             "--prediction hold or linear)");
   add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
              "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
   command->add_option("--stereo", options->stereo,

@@ -45,7 +45,7 @@ nlohmann::ordered_json json_of(const tracker::ConstellationFit& fit) {
 }
 
 std::string json_of(const std::vector<BallOutcome>& outcomes,
-                    const std::vector<tracker::Constellation>& constellations) {
+                    const std::vector<Constellation>& constellations) {
   nlohmann::ordered_json images = nlohmann::ordered_json::array();
   for (const BallOutcome& outcome : outcomes) {
     nlohmann::ordered_json node = {{"file", outcome.path.string()},
@@ -63,7 +63,7 @@ std::string json_of(const std::vector<BallOutcome>& outcomes,
   return json_text(nlohmann::ordered_json{{"images", images}}, 1) + "\n";
 }
 
-void print(const BallOutcome& outcome, const std::vector<tracker::Constellation>& constellations) {
+void print(const BallOutcome& outcome, const std::vector<Constellation>& constellations) {
   std::size_t count = 0;
   for (const Explanations& fits : outcome.found) count += fits.empty() ? 0 : 1;
   print_out("{}: {} balls, {} constellations\n", outcome.path.string(), outcome.balls.size(), count);
@@ -86,12 +86,12 @@ Status run_detect_balls(const DetectBallsOptions& options) {
     return usage_error("--constellation: poses need a camera; add --camera X.cameramodel.");
   LIMN_TRY(Imager camera, load_imager(options.camera));
   camera.imager_from_world = Pose{};
-  std::vector<tracker::Constellation> constellations;
+  std::vector<Constellation> constellations;
   for (const auto& path : options.constellations) {
-    LIMN_TRY(tracker::Constellation one, tracker::load_constellation(path));
+    LIMN_TRY(Constellation one, load_constellation(path));
     constellations.push_back(std::move(one));
   }
-  LIMN_TRY_STATUS(tracker::check_distinct(constellations));
+  LIMN_TRY_STATUS(check_distinct(constellations));
   tracker::BallFinder finder({.shade = options.shade, .encoding = options.encoding});
   std::vector<BallOutcome> outcomes;
   int failed = 0;

@@ -16,7 +16,7 @@ namespace {
 constexpr double k_least_ball_mm = 1, k_most_ball_mm = 1000;
 
 nlohmann::ordered_json json_of(const tracker::LearnedConstellation& learned) {
-  const tracker::Constellation& constellation = learned.constellation;
+  const Constellation& constellation = learned.constellation;
   nlohmann::ordered_json json = {{"schema", "limn.constellation/1"},
                                  {"name", constellation.name},
                                  {"ball_diameter_mm", 2e3 * constellation.radius_m},
@@ -62,9 +62,9 @@ Status run_learn_constellation(const LearnConstellationOptions& options) {
   LIMN_TRY_STATUS(check_options(options));
   LIMN_TRY(Imager camera, load_imager(options.camera));
   camera.imager_from_world = Pose{};  // a body's frame has no world frame
-  std::vector<tracker::Constellation> all;
+  std::vector<Constellation> all;
   for (const auto& path : options.others) {
-    LIMN_TRY(tracker::Constellation other, tracker::load_constellation(path));
+    LIMN_TRY(Constellation other, load_constellation(path));
     all.push_back(std::move(other));
   }
   tracker::BallFinder finder({.shade = options.shade, .encoding = options.encoding});
@@ -81,7 +81,7 @@ Status run_learn_constellation(const LearnConstellationOptions& options) {
       tracker::learn_constellation(views, 0.5e-3 * options.ball_mm, options.out.stem().string());
   if (!learned) return error("--learn-constellation: {}", learned.message());
   all.push_back(learned->constellation);
-  const Status distinct = tracker::check_distinct(all);
+  const Status distinct = check_distinct(all);
   if (!distinct) return error("--learn-constellation: {}", distinct.message());
   print(*learned);
   return write_file(options.out, json_text(json_of(*learned), 2) + "\n");

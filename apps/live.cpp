@@ -66,6 +66,12 @@ Status check_options(const LiveOptions& options) {
   if (!(options.extrapolate_s > 0 && options.extrapolate_s <= 5))
     return usage_error("--extrapolate: expected seconds over 0 and at most 5, found {}.",
                        options.extrapolate_s);
+  if (options.triple_pose == tracker::TriplePose::triangle &&
+      options.prediction == tracker::Prediction::filtered)
+    return usage_error(
+        "--triple-pose triangle: expected --prediction hold or linear with it, found filtered, which uses "
+        "the "
+        "balls' centres themselves and no pose of one image.");
   if (!options.devices.empty() && options.rig.empty())
     return usage_error("--devices: expected --rig and --scene with it, found neither.");
   if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
@@ -102,6 +108,8 @@ Result<VirtualSetup> load_virtual_setup(const LiveOptions& options) {
   } else {
     LIMN_TRY(loaded.world, session::room_for(loaded.setup.rig, loaded.setup.scene));
   }
+  for (Imager& camera : loaded.setup.rig.cameras)
+    if (const Imager* there = find_named(loaded.world.rig.cameras, camera.name)) camera.sees = there->sees;
   if (options.rig.empty()) {
     loaded.setup.rig = loaded.world.rig;
     loaded.setup.scene = *loaded.world.scene;
@@ -162,6 +170,7 @@ Status set_up(const LiveOptions& options, session::SessionSetup* setup) {
                          joined_names(setup->rig.projectors), name);
     setup->paint.stereo_projectors.push_back(name);
   }
+  setup->watch.triple_pose = options.triple_pose;
   setup->watch.motion.extrapolation_limit_s = options.extrapolate_s;
   setup->paint.motion = setup->watch.motion;
   return {};
@@ -241,7 +250,8 @@ Status play_in_virtual_room(const LiveOptions& options) {
   session::SessionSetup& setup = loaded.setup;
   LIMN_TRY_STATUS(check_fits(setup.rig, loaded.world.rig));
   LIMN_TRY_STATUS(set_up(options, &setup));
-  setup.paint.is_linear_camera = !loaded.world.camera_effects.front().srgb;
+  setup.paint.is_linear_camera =
+      !loaded.world.camera_effects.at(loaded.world.rig.first_visible_camera()).srgb;
   if (const Status coarser = make_coarser(options.resolution.value_or(1), &loaded); !coarser)
     return usage_error("--resolution: {}", coarser.message());
   session::RealTime real_time{loaded.world.rig, options.frame_period_s,
@@ -312,6 +322,8 @@ Status play_with_devices(const LiveOptions& options) {
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));
+  for (const device::CameraConfig& camera : devices.cameras)
+    if (camera.sees != Spectrum::visible) find_named(setup.rig.cameras, camera.name)->sees = camera.sees;
   for (const device::DisplayConfig& display : devices.displays)
     if (!is_projector(setup.rig, display.name))
       setup.screens.push_back(display.name);
@@ -319,7 +331,8 @@ Status play_with_devices(const LiveOptions& options) {
       setup.paint.stereo_projectors.push_back(display.name);
   LIMN_TRY_STATUS(set_up(options, &setup));
   setup.paint.is_linear_camera =
-      !setup.rig.cameras.empty() && is_measured_linear(setup.rig, setup.rig.cameras.front());
+      !setup.rig.cameras.empty() &&
+      is_measured_linear(setup.rig, setup.rig.cameras[setup.rig.first_visible_camera()]);
   std::optional<device::Desktop> desktop;
   if (options.window ||
       std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "tracker/balls/constellation_filter.h"
 #include "tracker/marker_light.h"
 #include "tracker/predict.h"
 
@@ -28,6 +29,7 @@ struct LiveOptions {
   bool window = false;
   tracker::Prediction prediction = tracker::Prediction::filtered;
   tracker::MarkerLight marker_light = tracker::MarkerLight::keep_out;
+  tracker::TriplePose triple_pose = tracker::TriplePose::refined;
   std::vector<std::string> stereo;     ///< Projectors of the virtual rig that show an image to each eye.
   bool refill = true;                  ///< Other projectors fill shadows.
   double extrapolate_s = 0.3;          ///< How long unseen markers are extrapolated.

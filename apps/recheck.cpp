@@ -57,9 +57,9 @@ Status capture_with_devices(const RecheckCommand& command, const fs::path& folde
   const Result<device::Desktop> desktop = device::Desktop::open();
   LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, desktop));
   LIMN_TRY(const calib::Board board, wizard::calibration_board(rig));
-  const calib::CaptureSet captures = calib::plan_captures(folder, wizard::captured_devices(devices.cameras),
-                                                          wizard::captured_devices(devices.projectors), board,
-                                                          calib::PatternCode::gray, {.inverses = false});
+  const calib::CaptureSet captures = calib::plan_captures(
+      folder, wizard::captured_devices(devices.cameras, devices.infrared),
+      wizard::captured_devices(devices.projectors), board, calib::PatternCode::gray, {.inverses = false});
   wizard::DeviceBackend device_backend(std::move(devices), board, nullptr);
   ImageWriter writer;
   return wizard::capture_once(captures, rig, device_backend.backend(&writer));

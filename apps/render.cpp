@@ -23,6 +23,8 @@
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/viewpoint.h"
+#include "tracker/balls/ball_finder.h"
+#include "tracker/balls/constellation_pose.h"
 #include "tracker/body_estimate.h"
 #include "tracker/camera_encoding.h"
 #include "tracker/detector.h"
@@ -70,22 +72,30 @@ Result<std::vector<Track>> find_bodies(const scene::Scene& scene, const Rig& rig
   const std::vector<Body> bodies = scene::bodies(scene);
   const std::vector<std::string> names = tracker::families_of(bodies);
   LIMN_TRY(const tracker::Families families, tracker::Families::load(names, scene.folder));
+  const std::vector<Constellation> constellations = scene::constellations(scene);
   std::vector<std::vector<tracker::Detection>> detections(frames.size());
+  std::vector<std::vector<tracker::Ball>> balls(frames.size());
   std::vector<tracker::View> views;
+  std::vector<tracker::BallView> ball_views;
   std::size_t marker_count = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (frames[i].empty()) continue;
-    tracker::Detector detector(families, {.encoding = tracker::encoding_of(rig, rig.cameras[i])});
+    const tracker::Encoding encoding = tracker::encoding_of(rig, rig.cameras[i]);
+    tracker::Detector detector(families, {.encoding = encoding});
     detections[i] = detector.detect(to_grey(frames[i]), &rig.cameras[i].lens);
+    if (!constellations.empty())
+      balls[i] = tracker::BallFinder({.encoding = encoding}).find(to_grey(frames[i]), rig.cameras[i].lens);
     marker_count += detections[i].size();
     views.push_back({&rig.cameras[i], detections[i]});
+    ball_views.push_back({&rig.cameras[i], balls[i]});
   }
   std::vector<Track> tracks = tracker::observed(bodies, views, Stamp{});
+  std::ranges::move(tracker::observed(constellations, ball_views, Stamp{}), std::back_inserter(tracks));
   if (tracks.empty()) {
     return error(
         "frames: expected a marker of the scene's {} bodies, found {} markers of its families and none that "
         "the scene names. Check light, focus and marker names.",
-        bodies.size(), marker_count);
+        bodies.size() + constellations.size(), marker_count);
   }
   return tracks;
 }

@@ -75,6 +75,7 @@ ordered_json marker_json(const sim::World& world, const sim::Truth& truth, const
   ordered_json json = {{"name", marker.marker.text()},
                        {"size_mm", marker.size_m * 1e3},
                        {"world_from_marker", pose_json(world_from_marker)}};
+  if (is_constellation(marker.marker)) return json;
   const double h = marker.size_m / 2;
   for (const Imager& camera : world.rig.cameras) {
     ordered_json corners = ordered_json::array();

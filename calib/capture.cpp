@@ -12,8 +12,10 @@ namespace {
 
 nlohmann::ordered_json devices_json(const std::vector<CapturedDevice>& devices) {
   auto list = nlohmann::ordered_json::array();
-  for (const CapturedDevice& device : devices)
+  for (const CapturedDevice& device : devices) {
     list.push_back({{"name", device.name}, {"size", {device.width, device.height}}});
+    if (device.sees != Spectrum::visible) list.back()["sees"] = k_spectra.text(device.sees);
+  }
   return list;
 }
 

@@ -106,6 +106,8 @@ std::vector<CapturedDevice> read_devices(const ConfigNode& list, const std::set<
     if (name.empty() || name.find('/') != std::string::npos || name == ".." || !names.insert(name).second)
       node.problem("expected a name of its own, without slashes, found '" + name + "'.");
     devices.push_back({name, width, height});
+    if (const auto sees = keys.contains("sees") ? node.find("sees") : std::nullopt)
+      devices.back().sees = k_spectra.read(*sees);
   }
   if (devices.empty()) list.problem("expected at least one device, found none.");
   return devices;
@@ -246,6 +248,18 @@ std::optional<BoardMeasured> read_board_measured(const ConfigNode& root) {
                        1e-3 * (stddev ? stddev->positive(k_most_stddev_mm) : 0.1)};
 }
 
+Status check_spectra(const CaptureSet& captures) {
+  const CapturedDevice& first = captures.cameras.front();
+  if (first.sees == Spectrum::visible) return {};
+  return error(
+      "{}: expected a first camera that sees visible light, and with it the projected patterns, found "
+      "\"sees\": "
+      "\"infrared\". Name a camera for visible light first; this one is then calibrated with it, by the "
+      "board "
+      "alone. (Cameras without projectors: limn solve --cameras-only, with the board in their own light.)",
+      first.name);
+}
+
 CaptureSet plan_captures(const fs::path& folder,
                          std::vector<CapturedDevice> cameras,
                          std::vector<CapturedDevice> projectors,
@@ -271,7 +285,7 @@ Result<CaptureSet> load_captures(const fs::path& folder, const std::vector<std::
              "board_measured_stddev_mm"});
   CaptureSet captures;
   captures.folder = folder;
-  captures.cameras = read_devices(root.at("cameras"), {"name", "size"});
+  captures.cameras = read_devices(root.at("cameras"), {"name", "size", "sees"});
   captures.projectors = read_devices(root.at("projectors"), {"name", "size", "patterns"});
   const std::string board = root.at("board").text();
   if (const auto lengths = root.find("known_lengths")) {

@@ -9,6 +9,7 @@
 #include "calib/board/board.h"
 #include "calib/board_print.h"
 #include "calib/code/patterns.h"
+#include "core/imager.h"
 #include "core/result.h"
 
 namespace limn {
@@ -22,6 +23,9 @@ struct CapturedDevice {
   std::string name;
   int width = 0;
   int height = 0;
+  /// A camera for infrared light sees no patterns: it is calibrated by the board's corners alone, which its
+  /// own lamp lights.
+  Spectrum sees = Spectrum::visible;
 };
 
 /// One placement of the board (or of the scene, where no board is visible).
@@ -64,6 +68,10 @@ CaptureSet plan_captures(const std::filesystem::path& folder,
 /// several projectors.
 std::filesystem::path image_path(
     const CaptureSet& captures, int pose, int projector, int camera, int pattern);
+
+/// Error when the first camera sees infrared light: it places the board, shows it to people and joins the
+/// projectors to the others.
+Status check_spectra(const CaptureSet& captures);
 
 /// Reads capture.json and patterns.json and lists the poses (`pose*` directories). A pose with a missing
 /// image is an error that names the first missing file. Poses named in `skip` are not read; a name in it that

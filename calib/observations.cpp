@@ -386,7 +386,8 @@ Result<Observed> observe_pose(const CaptureSet& captures,
   if (corners.empty()) return seen;
   const double decoding = now();
   std::vector<Decoded> by_projector;
-  for (size_t p = 0; p < captures.projectors.size(); ++p) {
+  const bool sees_patterns = captures.cameras[at_camera].sees == Spectrum::visible;
+  for (size_t p = 0; sees_patterns && p < captures.projectors.size(); ++p) {
     const CapturedDevice& device = captures.cameras[at_camera];
     LIMN_TRY(Decoded decoded, decode(captures.patterns[p], captures.poses[at_pose].images[p][at_camera],
                                      device.width, device.height, options));
@@ -419,7 +420,7 @@ Result<Observed> observe_pose(const CaptureSet& captures,
     seen.observations.corners.push_back(
         {camera, pose, corner.id, corner.px - white_shift_px, corner.stddev_px});
   seen.observations.cameras = captures.cameras;
-  add_room_points(by_projector, corners, camera, pose, k_room_points, &seen.observations);
+  if (sees_patterns) add_room_points(by_projector, corners, camera, pose, k_room_points, &seen.observations);
   seen.seconds_decode = now() - decoding;
   return seen;
 }
@@ -441,6 +442,17 @@ void append(const Observed& seen, Observed* all) {
   all->seconds_decode += seen.seconds_decode;
 }
 
+// What a camera decodes that sees no projected light.
+Decoded nothing_decoded(const CapturedDevice& camera) {
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  const cv::Size size(camera.width, camera.height);
+  Decoded decoded;
+  decoded.px_projector = cv::Mat(size, CV_32FC2, cv::Scalar::all(none));
+  decoded.variance = cv::Mat(size, CV_32FC2, cv::Scalar::all(0));
+  decoded.contrast = cv::Mat::zeros(size, CV_8U);
+  return decoded;
+}
+
 // A pose in which no camera sees the board is a scene capture.
 Status observe_scenes(const CaptureSet& captures,
                       const DecodeOptions& options,
@@ -457,6 +469,10 @@ Status observe_scenes(const CaptureSet& captures,
       const CapturedDevice& device = captures.cameras[camera];
       for (size_t p = 0; p < captures.projectors.size(); ++p) {
         if (should_continue && !should_continue()) return error("{}", k_ended);
+        if (device.sees != Spectrum::visible) {
+          decoded[camera].push_back(nothing_decoded(device));
+          continue;
+        }
         LIMN_TRY(Decoded seen, decode(captures.patterns[p], captures.poses[pose].images[p][camera],
                                       device.width, device.height, options));
         decoded[camera].push_back(std::move(seen));

@@ -472,7 +472,7 @@ Result<Seed> seed(const Observations& observations,
   for (int i = 0; i < static_cast<int>(observations.cameras.size()); ++i) {
     LIMN_TRY(CameraSeed camera, seed_camera(observations, i, camera_models[static_cast<size_t>(i)]));
     const CapturedDevice& device = observations.cameras[static_cast<size_t>(i)];
-    seeded.cameras.push_back({device.name, device.width, device.height, camera.lens, Pose()});
+    seeded.cameras.push_back({device.name, device.width, device.height, camera.lens, Pose(), device.sees});
     cameras.push_back(std::move(camera));
   }
   LIMN_TRY_STATUS(link(observations, cameras, projector_models, &seeded));

@@ -213,8 +213,9 @@ Pose ConfigNode::pose() const {
   return {q, translation};
 }
 
-std::filesystem::path ConfigNode::path_inside() const {
-  const std::filesystem::path path = text();
+std::filesystem::path ConfigNode::path_inside() const { return path_inside(text()); }
+
+std::filesystem::path ConfigNode::path_inside(const std::filesystem::path& path) const {
   if (!json_) return {};
   const std::filesystem::path normal = path.lexically_normal();
   if (path.empty() || path.is_absolute() || *normal.begin() == "..") {

@@ -54,6 +54,8 @@ class ConfigNode {
   Pose pose() const;
   /// A relative path that must stay inside the file's folder; returned joined to that folder.
   std::filesystem::path path_inside() const;
+  /// The same for a path that is a part of this value's text.
+  std::filesystem::path path_inside(const std::filesystem::path& path) const;
 
   bool is_object() const;
   bool is_array() const;

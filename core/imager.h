@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/enum_names.h"
 #include "core/lens.h"
 #include "core/pose.h"
 
@@ -11,6 +12,14 @@ namespace limn {
 
 /// Largest width and height of an imager, in pixels; GL 4.5 guarantees textures of this size.
 inline constexpr int k_max_side = 16384;
+
+/// The light that a camera receives.
+enum class Spectrum {
+  visible,
+  infrared  ///< through a filter that blocks projected light
+};
+/// Their names in files.
+inline constexpr EnumNames<Spectrum, 2> k_spectra{{"visible", "infrared"}};
 
 /// A half-line: origin (m) and unit direction.
 struct Ray {
@@ -26,6 +35,7 @@ struct Imager {
   int height = 0;
   Lens lens;
   Pose imager_from_world;
+  Spectrum sees = Spectrum::visible;  ///< only for cameras
 
   /// Pixel of a world point, which may lie outside the image; nullopt when the point has no pixel (behind the
   /// imager).

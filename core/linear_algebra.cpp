@@ -49,6 +49,16 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m) {
   return u * Eigen::Vector3d(1, 1, sign).asDiagonal() * v.transpose();
 }
 
+Pose aligned(std::span<const Eigen::Vector3d> p_a, std::span<const Eigen::Vector3d> p_b) {
+  Eigen::Vector3d mean_a = Eigen::Vector3d::Zero(), mean_b = mean_a;
+  for (std::size_t i = 0; i < p_a.size(); ++i) mean_a += p_a[i], mean_b += p_b[i];
+  mean_a /= static_cast<double>(p_a.size()), mean_b /= static_cast<double>(p_b.size());
+  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
+  for (std::size_t i = 0; i < p_a.size(); ++i) moment += (p_a[i] - mean_a) * (p_b[i] - mean_b).transpose();
+  const Eigen::Matrix3d rotation = nearest_rotation(moment);
+  return {rotation, mean_a - rotation * mean_b};
+}
+
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
   return Eigen::Quaterniond::FromTwoVectors(from, to);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 #include "core/pose.h"
 
@@ -22,6 +23,10 @@ Vector6d solve_ldlt(const Matrix6d& symmetric, const Vector6d& b);
 /// The rotation R that is nearest to m: it minimises |R - m|. For m = sum of b_i a_i^T it also minimises the
 /// distances between R a_i and b_i (Kabsch 1976).
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& m);
+
+/// The pose a_from_b that minimises the sum of squares |a - a_from_b b| (Kabsch 1976). The points of each set
+/// must not lie on a line.
+Pose aligned(std::span<const Eigen::Vector3d> p_a, std::span<const Eigen::Vector3d> p_b);
 
 /// The smallest rotation that turns the direction of `from` into the direction of `to`.
 Eigen::Quaterniond rotation_between(const Eigen::Vector3d& from, const Eigen::Vector3d& to);

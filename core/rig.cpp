@@ -18,7 +18,7 @@ Imager read_imager(const ConfigNode& node, bool is_projector) {
   if (is_projector)
     node.only({"name", "size", "lens", "imager_from_world", "focus"});
   else
-    node.only({"name", "size", "lens", "imager_from_world"});
+    node.only({"name", "size", "lens", "imager_from_world", "sees"});
   Imager imager;
   imager.name = node.at("name").text();
   const auto [width, height] = node.at("size").image_size();
@@ -30,6 +30,7 @@ Imager read_imager(const ConfigNode& node, bool is_projector) {
   if (made) imager.lens = *made;
   if (!made) lens.problem(made.message() + " Run limn calibrate again.");
   imager.imager_from_world = node.at("imager_from_world").pose();
+  if (const auto sees = node.find("sees")) imager.sees = k_spectra.read(*sees);
   return imager;
 }
 
@@ -107,10 +108,12 @@ Result<Rig> load_cameramodels(const fs::path& folder) {
 }
 
 OrderedJson json_of(const Imager& imager) {
-  return {{"name", imager.name},
-          {"size", {imager.width, imager.height}},
-          {"lens", {{"model", imager.lens.model.name()}, {"values", imager.lens.values}}},
-          {"imager_from_world", to_json(imager.imager_from_world)}};
+  OrderedJson json = {{"name", imager.name},
+                      {"size", {imager.width, imager.height}},
+                      {"lens", {{"model", imager.lens.model.name()}, {"values", imager.lens.values}}},
+                      {"imager_from_world", to_json(imager.imager_from_world)}};
+  if (imager.sees != Spectrum::visible) json["sees"] = k_spectra.text(imager.sees);
+  return json;
 }
 
 }  // namespace
@@ -122,6 +125,11 @@ const Imager* Rig::find(const std::string& name) const {
     }
   }
   return nullptr;
+}
+
+std::size_t Rig::first_visible_camera() const {
+  const auto found = std::ranges::find(cameras, Spectrum::visible, &Imager::sees);
+  return found == cameras.end() ? 0 : static_cast<std::size_t>(found - cameras.begin());
 }
 
 Result<Rig> load_rig(const fs::path& path) {

@@ -31,6 +31,9 @@ struct Rig {
   std::vector<Focus> focuses = {};                    ///< Only for projectors whose focus is in rig.json.
 
   const Imager* find(const std::string& name) const;
+  /// Index of the first camera that sees visible light: its images are shown to people and compared with
+  /// projected light. 0 when all see infrared, or when there is none.
+  std::size_t first_visible_camera() const;
 };
 
 /// Reads a rig folder: `rig.json` (limn.rig/1) and, if present, `response.json`. A folder without rig.json is

@@ -32,13 +32,14 @@ std::string source_of(const ConfigNode& node, const std::filesystem::path& folde
 }
 
 device::CameraConfig read_camera(const ConfigNode& node, const std::filesystem::path& folder) {
-  node.only({"name", "source", "size", "exposure_ms", "gain", "white_balance_k"});
+  node.only({"name", "source", "size", "exposure_ms", "gain", "white_balance_k", "sees"});
   device::CameraConfig camera;
   camera.name = node.at("name").text();
   camera.source = source_of(node.at("source"), folder);
   camera.size = size_of(node);
   camera.sensor.exposure_ms = positive_of(node, "exposure_ms");
   if (const auto gain = node.find("gain")) camera.sensor.gain = gain->number();
+  if (const auto sees = node.find("sees")) camera.sees = k_spectra.read(*sees);
   camera.sensor.white_balance_k = positive_of(node, "white_balance_k");
   return camera;
 }

@@ -2,6 +2,7 @@
 
 #include <memory>
 
+#include "core/imager.h"
 #include "device/camera_source.h"
 #include "device/sensor_settings.h"
 
@@ -15,7 +16,8 @@ struct CameraConfig {
   cv::Size size = {};          ///< Size of the frames (V4L2 and GigE set it); another size is an error.
   bool grey = false;           ///< Grey frames only, which is faster.
   bool repeat = false;         ///< Whether stored images start again after the last one.
-  double limit_s = 2;          ///< next() returns within this time, with a frame or an error.
+  Spectrum sees = Spectrum::visible;
+  double limit_s = 2;  ///< next() returns within this time, with a frame or an error.
 };
 
 /// Opens a camera from its source's text: `http://…` (MJPEG), `rtsp://…`, `v4l2:/dev/video0`, `gige:ID`, a

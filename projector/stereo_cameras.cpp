@@ -25,6 +25,7 @@ double angle(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 }
 
 bool is_pair(const Imager& left, const Imager& right) {
+  if (left.sees != Spectrum::visible || right.sees != Spectrum::visible) return false;
   const Eigen::Vector3d base = centre(right) - centre(left);
   return base.norm() > k_shortest_m && angle(base, axis(left, 0)) < k_from_rows &&
          angle(base, axis(right, 0)) < k_from_rows && angle(axis(left, 2), axis(right, 2)) < k_between_axes;

@@ -16,8 +16,8 @@ namespace limn::projector {
 class StereoCameras {
  public:
   /// Chooses the two cameras with the shortest base line, of those whose base line is longer than 5 mm and
-  /// lies within 30 degrees of both images' rows, and that look within 40 degrees of each other. nullopt:
-  /// there are no such two.
+  /// lies within 30 degrees of both images' rows, that look within 40 degrees of each other, and that see
+  /// visible light. nullopt: there are no such two.
   static std::optional<StereoCameras> chosen(const Rig& rig);
 
   /// Index in the rig of the left and the right eye's camera.

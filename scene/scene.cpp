@@ -59,6 +59,21 @@ MarkerName read_carrier(const ConfigNode& node, Reader* reader) {
   return name;
 }
 
+// The balls that a marker's name means; nullopt for a square marker. A file without a constellation is a
+// problem of `node`.
+std::optional<Constellation> read_constellation(const MarkerName& name, const ConfigNode& node) {
+  if (!is_constellation(name)) return std::nullopt;
+  auto balls = load_constellation(node.path_inside(name.id));
+  if (!balls) node.problem(balls.message());
+  return balls ? *balls : Constellation{};
+}
+
+void refuse_size(const ConfigNode& node) {
+  if (const auto size = node.find("size_mm"))
+    size->problem(
+        "expected no side of a marker beside a constellation, whose file states all sizes. Remove it.");
+}
+
 MeshFile read_mesh_file(const ConfigNode& node) {
   const ConfigNode mesh = node.at("mesh");
   MeshFile file{mesh.where(), mesh.path_inside(), {}};
@@ -87,6 +102,18 @@ void read_marker_file(const ConfigNode& node, Prototype* prototype, Reader* read
   prototype->markers = std::move(*markers);
 }
 
+void read_prototype_marker(const ConfigNode& node, Prototype* prototype, Reader* reader) {
+  node.only({"name", "size_mm", "prototype_from_marker"});
+  const MarkerName name = read_carrier(node.at("name"), reader);
+  const Pose prototype_from_marker = node.at("prototype_from_marker").pose();
+  if (const auto balls = read_constellation(name, node.at("name"))) {
+    refuse_size(node);
+    prototype->constellation = placed(*balls, "prototype", prototype_from_marker);
+  } else {
+    prototype->markers.push_back({name, read_size_m(node), prototype_from_marker});
+  }
+}
+
 Prototype read_prototype(const ConfigNode& node, Reader* reader) {
   node.only({"mesh", "units", "markers", "albedo"});
   Prototype prototype;
@@ -95,11 +122,11 @@ Prototype read_prototype(const ConfigNode& node, Reader* reader) {
   if (markers && markers->is_string()) {
     read_marker_file(*markers, &prototype, reader);
   } else if (markers) {
-    for (const ConfigNode& item : markers->items()) {
-      item.only({"name", "size_mm", "prototype_from_marker"});
-      prototype.markers.push_back({read_carrier(item.at("name"), reader), read_size_m(item),
-                                   item.at("prototype_from_marker").pose()});
-    }
+    for (const ConfigNode& item : markers->items()) read_prototype_marker(item, &prototype, reader);
+    if (prototype.constellation && markers->items().size() > 1)
+      markers->problem(
+          "expected either square markers or one constellation on the prototype, found more beside a "
+          "constellation. Learn all balls as one constellation, and remove the others.");
   }
   if (const auto albedo = node.find("albedo")) read_albedo(*albedo, &prototype, reader);
   return prototype;
@@ -129,7 +156,11 @@ Slot read_slot(const ConfigNode& node, Reader* reader) {
         slot.name));
   }
   slot.marker = read_carrier(node.at("marker"), reader);
-  slot.size_m = read_size_m(node);
+  slot.constellation = read_constellation(slot.marker, node.at("marker"));
+  if (slot.constellation)
+    refuse_size(node);
+  else
+    slot.size_m = read_size_m(node);
   slot.marker_from_part = node.at("marker_from_part").pose();
   if (const auto mode = node.find("mode")) {
     slot.mode = mode->choice({"view", "surface"}) == "surface" ? Mode::surface : Mode::view;
@@ -162,6 +193,8 @@ Control read_control(const ConfigNode& node, const Scene& scene) {
   node.only({"marker", "action", "slot", "gesture"});
   Control control;
   control.marker = read_marker_name(node.at("marker"));
+  if (is_constellation(control.marker))
+    node.at("marker").problem("expected a square marker for a control, found a constellation.");
   control.action = read_action(node.at("action"));
   if (const auto gesture = node.find("gesture")) control.gesture = k_gestures.read(*gesture);
   if (const auto slot = node.find("slot")) {
@@ -201,7 +234,11 @@ Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
   Viewer viewer;
   if (const auto weight = node.find("weight")) viewer.weight = weight->positive();
   if (const auto fixed = node.find("fixed")) viewer.fixed = read_viewer_imager(*fixed);
-  if (const auto marker = node.find("marker")) viewer.marker = read_marker_name(*marker);
+  if (const auto marker = node.find("marker")) {
+    viewer.marker = read_marker_name(*marker);
+    viewer.constellation = read_constellation(*viewer.marker, *marker);
+    if (viewer.constellation) refuse_size(node);
+  }
   if (const auto tablet = node.find("tablet")) viewer.tablet = read_tablet(*tablet);
   if (const auto tracked = node.find("tracked")) {
     viewer.is_tracked = tracked->boolean();
@@ -214,10 +251,10 @@ Viewer read_viewer(const ConfigNode& node, const Scene& scene) {
     node.problem(fmt::format("expected one of \"fixed\", \"marker\", \"tracked\" and \"tablet\", found {}.",
                              k_found[static_cast<std::size_t>(kinds)]));
   }
-  if (const auto size = node.find("size_mm"))
+  if (const auto size = viewer.constellation ? std::nullopt : node.find("size_mm"))
     viewer.marker_size_m = 1e-3 * size->positive(k_largest_marker_mm);
-  else if (!scene.slots.empty())
-    viewer.marker_size_m = scene.slots[0].size_m;
+  else if (!viewer.constellation)
+    viewer.marker_size_m = first_marker_size_m(scene);
   if (const auto eye = node.find("eye_mm")) viewer.p_eye_marker = 1e-3 * eye->vector3();
   return viewer;
 }
@@ -470,6 +507,8 @@ Result<Scene> load_scene(const fs::path& path,
   if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
   if (const auto node = root.find("light")) scene.light = read_room_light(*node);
   LIMN_TRY_STATUS(config.status());
+  if (const Status distinct = check_distinct(constellations(scene)); !distinct)
+    return error("{}: {}", file.string(), distinct.message());
   LeftOut left_out;
   LIMN_TRY_STATUS(load_files(reader, file, &scene, &left_out));
   if (!skipped_variants && !left_out.variants.empty()) return error("{}", left_out.variants[0].why);
@@ -515,12 +554,30 @@ std::vector<Body> bodies(const Scene& scene) {
   std::vector<Body> out;
   if (scene.prototype && !scene.prototype->markers.empty())
     out.push_back({"prototype", scene.prototype->markers});
-  for (const Slot& slot : scene.slots) out.push_back({slot.name, {{slot.marker, slot.size_m, Pose()}}});
+  for (const Slot& slot : scene.slots)
+    if (!slot.constellation) out.push_back({slot.name, {{slot.marker, slot.size_m, Pose()}}});
   for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
     const Viewer& viewer = scene.viewers[i];
-    if (viewer.marker) out.push_back({viewer_body(i), {{*viewer.marker, viewer.marker_size_m, Pose()}}});
+    if (viewer.marker && !viewer.constellation)
+      out.push_back({viewer_body(i), {{*viewer.marker, viewer.marker_size_m, Pose()}}});
   }
   return out;
+}
+
+std::vector<Constellation> constellations(const Scene& scene) {
+  std::vector<Constellation> out;
+  if (scene.prototype && scene.prototype->constellation) out.push_back(*scene.prototype->constellation);
+  for (const Slot& slot : scene.slots)
+    if (slot.constellation) out.push_back(placed(*slot.constellation, slot.name, Pose()));
+  for (std::size_t i = 0; i < scene.viewers.size(); ++i)
+    if (const auto& balls = scene.viewers[i].constellation)
+      out.push_back(placed(*balls, viewer_body(i), Pose()));
+  return out;
+}
+
+double first_marker_size_m(const Scene& scene) {
+  const auto square = std::ranges::find_if(scene.slots, [](const Slot& slot) { return !slot.constellation; });
+  return square == scene.slots.end() ? 0 : square->size_m;
 }
 
 std::string viewer_body(std::size_t viewer) { return fmt::format("(viewer {})", viewer); }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "core/constellation.h"
 #include "core/gesture.h"
 #include "core/imager.h"
 #include "core/marker.h"
@@ -20,9 +21,10 @@ namespace limn::scene {
 /// The physical object that is lit. Its coordinate frame is its mesh's.
 struct Prototype {
   Mesh mesh;
-  std::vector<BodyMarker> markers;  ///< body_from_marker is prototype_from_marker.
-  double albedo = 0.8;              ///< Diffuse albedo, used without albedo_image.
-  cv::Mat albedo_image;             ///< 8-bit BGR sRGB in the mesh's uv; empty: none.
+  std::vector<BodyMarker> markers;                  ///< body_from_marker is prototype_from_marker.
+  std::optional<Constellation> constellation = {};  ///< Balls instead of markers, in the prototype's frame.
+  double albedo = 0.8;                              ///< Diffuse albedo, used without albedo_image.
+  cv::Mat albedo_image;                             ///< 8-bit BGR sRGB in the mesh's uv; empty: none.
 };
 
 enum class Mode {
@@ -41,15 +43,16 @@ struct Variant {
   std::optional<AutoImported> auto_imported = {};
 };
 
-/// A place for one part, carried by one marker.
+/// A place for one part, carried by one marker or constellation.
 struct Slot {
   std::string name;
-  MarkerName marker;
-  double size_m = 0;
+  MarkerName marker;  ///< `constellation:FILE` means balls.
+  double size_m = 0;  ///< The marker's side; 0 for a constellation.
   Pose marker_from_part;
   Mode mode = Mode::view;
   bool stick_to_surface = false;
   std::vector<Variant> variants;
+  std::optional<Constellation> constellation = {};  ///< The balls of `marker`, whose frame is their file's.
 };
 
 /// A marker that triggers an action when it is covered, turned or laid down.
@@ -73,6 +76,7 @@ struct Viewer {
   Eigen::Vector3d p_eye_marker = Eigen::Vector3d::Zero();
   /// The guest's name; empty: the tablet of every guest is a viewer.
   std::optional<std::string> tablet = {};
+  std::optional<Constellation> constellation = {};  ///< The balls of `marker`.
 };
 
 /// The content of a project folder's scene.json (limn.scene/1), with all files that it names.
@@ -126,9 +130,13 @@ std::string units_json(const Slot& slot, const std::string& variant, LengthUnit 
 /// Reads a viewer file (docs/formats.md): {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
-/// The bodies for the tracker: "prototype", one body per slot, with the slot's name, and viewer_body(i) for
-/// each viewer i with a marker.
+/// The bodies that carry square markers, for the tracker: "prototype", one body per slot, with the slot's
+/// name, and viewer_body(i) for each viewer i with a marker.
 std::vector<Body> bodies(const Scene& scene);
+/// The bodies that carry balls, with the same names, in their bodies' frames.
+std::vector<Constellation> constellations(const Scene& scene);
+/// The side of the first slot's square marker, m; 0 when no slot has one.
+double first_marker_size_m(const Scene& scene);
 /// The body's name of a viewer's marker. It differs from every slot's name.
 std::string viewer_body(std::size_t viewer);
 /// The body's name of a marker that carries nothing in the scene. It differs from every slot's name.

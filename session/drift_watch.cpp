@@ -28,8 +28,11 @@ constexpr double k_as_good = 0.92;  // devices with this share of the best gain 
 cv::Mat papers(const Imager& camera,
                const std::vector<tracker::Detection>& detections,
                std::span<const Body> bodies,
+               std::span<const Constellation> constellations,
                std::span<const Track> tracks) {
-  cv::Mat mask = tracker::marker_mask(camera, bodies, tracks, {.margin = (k_paper - 1) / 2});
+  const tracker::MarkerLightOptions paper{.margin = (k_paper - 1) / 2};
+  cv::Mat mask = tracker::marker_mask(camera, bodies, tracks, paper);
+  if (!constellations.empty()) mask |= tracker::ball_mask(camera, constellations, tracks, paper);
   for (const tracker::Detection& detection : detections) {
     Eigen::Vector2d middle = Eigen::Vector2d::Zero();
     for (const auto& corner : detection.corners_px) middle += 0.25 * corner;
@@ -71,6 +74,7 @@ DriftWatch::DriftWatch(const Rig& rig) : rig_(rig) {
 void DriftWatch::compare(const Percepts& percepts,
                          const scene::PosedScene& posed,
                          std::span<const Body> bodies,
+                         std::span<const Constellation> constellations,
                          std::span<const Track> tracks,
                          const ProjectionHistory& shown,
                          projector::Renderer* renderer) {
@@ -97,12 +101,13 @@ void DriftWatch::compare(const Percepts& percepts,
   began_at_ = compared_at_ = at;
   turn_ = (turn_ + 1) % lights_.size();
   const Frame& frame = percepts.frames[turn_];
-  if (frame.image.empty()) return;
+  if (frame.image.empty() || rig_.cameras[turn_].sees != Spectrum::visible) return;
   const auto* now = shown.at(frame.captured_at);
   const auto* before = shown.at(shifted(frame.captured_at, -k_before_s));
   if (!now || !before) return;
-  lights_[turn_].begin(frame, *now, *before,
-                       papers(rig_.cameras[turn_], percepts.detections[turn_], bodies, tracks));
+  lights_[turn_].begin(
+      frame, *now, *before,
+      papers(rig_.cameras[turn_], percepts.detections[turn_], bodies, constellations, tracks));
 }
 
 // Finds the device whose motion explains best what all cameras see; nullopt if no motion explains it better
@@ -126,6 +131,7 @@ std::optional<Drift> DriftWatch::judged() const {
   for (const Imager& projector : rig_.projectors) candidates.push_back({projector.name});
   for (std::size_t i = 0; i < lights_.size(); ++i) {
     const projector::LightDisplacements places = lights_[i].displacements();
+    if (rig_.cameras[i].sees != Spectrum::visible) continue;  // it sees no projected light
     for (std::size_t k = 0; k < places.projectors.size(); ++k)
       candidates[k].add(places.projectors[k], places.mm_per_px);
     candidates.push_back({rig_.cameras[i].name});

@@ -55,6 +55,7 @@ class DriftWatch {
   void compare(const Percepts& percepts,
                const scene::PosedScene& posed,
                std::span<const Body> bodies,
+               std::span<const Constellation> constellations,
                std::span<const Track> tracks,
                const ProjectionHistory& shown,
                projector::Renderer* renderer);

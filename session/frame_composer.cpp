@@ -4,6 +4,7 @@
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "core/names.h"
 #include "session/feedback.h"
 #include "session/stillness.h"
 
@@ -76,6 +77,8 @@ FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
       renderer_(std::move(renderer)),
       options_(options),
       bodies_(scene::bodies(subject_->scene)),
+      constellations_(scene::constellations(subject_->scene)),
+      has_infrared_(std::ranges::count(subject_->rig.cameras, Spectrum::infrared, &Imager::sees) > 0),
       prototype_box_(box_of(subject_->scene)),
       viewpoints_(&subject_->scene, &subject_->rig),
       fading_(options),
@@ -154,8 +157,8 @@ OverlayTarget FrameComposer::target(std::size_t projector, const Imager& viewer,
 std::vector<Body> FrameComposer::bodies_without_light(const Percepts& percepts) const {
   std::vector<Body> bodies = bodies_;
   for (const LooseMarker& loose : percepts.loose)
-    bodies.push_back(
-        {scene::loose_body(loose.marker), {{loose.marker, loose_size_m(subject_->scene), Pose()}}});
+    bodies.push_back({scene::loose_body(loose.marker),
+                      {{loose.marker, scene::first_marker_size_m(subject_->scene), Pose()}}});
   return bodies;
 }
 
@@ -163,8 +166,21 @@ cv::Mat FrameComposer::keep_off_markers(const cv::Mat& image,
                                         std::size_t projector,
                                         std::span<const Body> bodies) const {
   if (options_.marker_light == tracker::MarkerLight::as_is) return image;
-  const cv::Mat mask = tracker::marker_mask(subject_->rig.projectors[projector], bodies, composed_.tracks);
-  return tracker::with_marker_light(image, mask, options_.marker_light);
+  const std::vector<Track> tracks =
+      has_infrared_
+          ? tracker::seen_in_visible_light(subject_->rig.cameras, bodies, constellations_, composed_.tracks)
+          : composed_.tracks;
+  return tracker::with_marker_light(image, carrier_mask(projector, bodies, tracks), options_.marker_light);
+}
+
+// Where a projector's light falls on markers and balls.
+cv::Mat FrameComposer::carrier_mask(std::size_t projector,
+                                    std::span<const Body> bodies,
+                                    std::span<const Track> tracks) const {
+  const Imager& imager = subject_->rig.projectors[projector];
+  cv::Mat mask = tracker::marker_mask(imager, bodies, tracks);
+  if (!constellations_.empty()) mask |= tracker::ball_mask(imager, constellations_, tracks);
+  return mask;
 }
 
 // The split view (another look left of a line) and the grid.
@@ -184,16 +200,10 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
   std::vector<Overlay> out;
   const Stamp at = composed_.shown_at;
   for (const Track& track : composed_.tracks) {
-    const auto body =
-        std::find_if(bodies_.begin(), bodies_.end(), [&](const Body& b) { return b.name == track.body; });
-    if (body == bodies_.end()) continue;
     const std::optional<Stamp> lost_at = fading_.lost_at(track.body);
     const PartFading::Label* label = fading_.label(track.body);
-    for (const BodyMarker& marker : body->markers) {
-      const Pose world_from_marker = track.world_from_body * marker.body_from_marker;
-      const auto projector = best_projector(world_from_marker);
-      if (!projector) continue;
-      RingOverlay ring{*projector, world_from_marker, marker.size_m, k_red, k_sign};
+    for (const SignPlace& place : sign_places(track)) {
+      RingOverlay ring{place.projector, place.world_from_marker, place.size_m, k_red, k_sign};
       if (lost_at) {
         ring.strength *= std::max(0.0, 1 - seconds_between(*lost_at, at) / options_.lost_s);
         out.push_back(ring);
@@ -203,7 +213,7 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
       }
       if (label) {
         const double age = seconds_between(label->since, at) / options_.label_s;
-        out.push_back(WordOverlay{*projector, world_from_marker, marker.size_m, label->text,
+        out.push_back(WordOverlay{place.projector, place.world_from_marker, place.size_m, label->text,
                                   k_sign * std::min(1.0, 3 * (1 - age))});
       }
     }
@@ -212,10 +222,31 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
   for (const LooseMarker& loose : waiting) {
     const double share = &loose == &waiting.back() ? 1 : k_other_waiting;
     if (const auto projector = best_projector(loose.world_from_marker))
-      out.push_back(RingOverlay{*projector, loose.world_from_marker, loose_size_m(subject_->scene), k_blue,
-                                k_sign * share});
+      out.push_back(RingOverlay{*projector, loose.world_from_marker,
+                                scene::first_marker_size_m(subject_->scene), k_blue, k_sign * share});
   }
   return out;
+}
+
+// At each marker of the body, and in the middle of a constellation, facing the first projector that reaches
+// it.
+std::vector<FrameComposer::SignPlace> FrameComposer::sign_places(const Track& track) const {
+  std::vector<SignPlace> places;
+  if (const Body* body = find_named(bodies_, track.body))
+    for (const BodyMarker& marker : body->markers) {
+      const Pose world_from_marker = track.world_from_body * marker.body_from_marker;
+      if (const auto projector = best_projector(world_from_marker))
+        places.push_back({*projector, world_from_marker, marker.size_m});
+    }
+  const Constellation* balls = find_named(constellations_, track.body);
+  const std::vector<Imager>& projectors = subject_->rig.projectors;
+  for (std::size_t i = 0; balls && i < projectors.size(); ++i) {
+    const Pose facing(projectors[i].imager_from_world.rotation.inverse(), track.world_from_body.translation);
+    if (!(head_on(projectors[i], facing) > 0)) continue;
+    places.push_back({i, facing, 2 * reach_of(*balls)});
+    break;
+  }
+  return places;
 }
 
 // The projector whose light meets a marker most directly; nullopt when none reaches it.
@@ -233,7 +264,7 @@ std::optional<std::size_t> FrameComposer::best_projector(const Pose& world_from_
 }
 
 void FrameComposer::check_drift(const Percepts& percepts) {
-  drifts_.compare(percepts, composed_.posed, bodies_, composed_.tracks, shown_, &renderer_);
+  drifts_.compare(percepts, composed_.posed, bodies_, constellations_, composed_.tracks, shown_, &renderer_);
 }
 
 EyeImages FrameComposer::screen(const Percepts& percepts,
@@ -242,10 +273,12 @@ EyeImages FrameComposer::screen(const Percepts& percepts,
                                 const ScreenRequest& request) {
   std::vector<TrackedFrame> cameras;
   for (const Frame& frame : percepts.frames) {
-    const bool is_first = cameras.empty();
-    if (!is_first && !request.for_two_eyes) break;  // one eye sees camera 0's image
-    const std::vector<Track> at_frame = is_first ? std::vector(tracks.begin(), tracks.end())
-                                                 : predicted_at(percepts, options_, frame.captured_at);
+    const bool is_seen_by_one = cameras.size() == percepts.screen_camera;
+    std::vector<Track> at_frame;
+    if (is_seen_by_one)
+      at_frame.assign(tracks.begin(), tracks.end());
+    else if (request.for_two_eyes)
+      at_frame = predicted_at(percepts, options_, frame.captured_at);
     cameras.push_back({frame, scene::assign_tracks(subject_->scene, show_state, at_frame)});
     keep_still(fading_.faded().world_from_prototype, prototype_box_, &cameras.back().tracks);
   }
@@ -256,7 +289,7 @@ EyeImages FrameComposer::screen(const Percepts& percepts,
 cv::Mat FrameComposer::free_surface(std::size_t projector) {
   cv::Mat points = renderer_.surface_points(projector, composed_.posed);
   points.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
-               tracker::marker_mask(subject_->rig.projectors[projector], bodies_, composed_.tracks));
+               carrier_mask(projector, bodies_, composed_.tracks));
   return points;
 }
 

@@ -108,11 +108,23 @@ class FrameComposer {
   OverlayTarget target(std::size_t projector, const Imager& viewer, cv::Mat* image);
   bool is_stereo(std::size_t projector) const;
   std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;
+  // A place for the signs of a body, in front of one projector.
+  struct SignPlace {
+    std::size_t projector;
+    Pose world_from_marker;
+    double size_m;
+  };
+  std::vector<SignPlace> sign_places(const Track& track) const;
+  cv::Mat carrier_mask(std::size_t projector,
+                       std::span<const Body> bodies,
+                       std::span<const Track> tracks) const;
 
   std::unique_ptr<const Subject> subject_;
   projector::Renderer renderer_;
   ComposeOptions options_;
   std::vector<Body> bodies_;
+  std::vector<Constellation> constellations_;
+  bool has_infrared_ = false;          // whether a camera sees no projected light
   Eigen::AlignedBox3d prototype_box_;  // in the prototype's frame
   ViewpointSelector viewpoints_;
   PartFading fading_;

@@ -10,8 +10,8 @@ std::vector<Track> predicted_at(const Percepts& percepts, const ComposeOptions& 
 }
 
 Prediction predicted_at_capture(const Percepts& percepts, const ComposeOptions& options) {
-  const bool has_image = !percepts.frames.empty() && percepts.frames[0].captured_at != Stamp{};
-  const Stamp image_at = has_image ? percepts.frames[0].captured_at : percepts.captured_at;
+  const Frame frame = percepts.frames.empty() ? Frame{} : percepts.frames[percepts.screen_camera];
+  const Stamp image_at = frame.captured_at != Stamp{} ? frame.captured_at : percepts.captured_at;
   Prediction out;
   out.at_capture = predicted_at(percepts, options, percepts.captured_at);
   out.at_image =

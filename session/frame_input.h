@@ -25,7 +25,7 @@ struct ComposeOptions {
   /// Projectors whose images are drawn for each eye of the viewer, by name.
   std::vector<std::string> stereo_projectors = {};
   bool refill = true;  ///< other projectors fill in light that a shadow blocks
-  /// Camera 0's images are proportional to light; they are converted to sRGB for screens.
+  /// The images that screens show are proportional to light; they are converted to sRGB for screens.
   bool is_linear_camera = false;
 };
 
@@ -49,8 +49,9 @@ struct FrameTimes {
 struct Prediction {
   /// At the newest camera frame. They decide whether a pin's marker has moved.
   std::vector<Track> at_capture;
-  /// At camera 0's newest image, which screens and tablets draw over. With several cameras this differs from
-  /// at_capture: drawn for any other moment, parts would lie beside what that image shows.
+  /// At the newest image of Percepts::screen_camera, which screens and tablets draw over. With several
+  /// cameras this differs from at_capture: drawn for any other moment, parts would lie beside what that image
+  /// shows.
   std::vector<Track> at_image;
   std::vector<Track> at_light;  ///< at FrameTimes::shown_at
 };

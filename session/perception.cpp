@@ -69,8 +69,6 @@ std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body
 
 }  // namespace
 
-double loose_size_m(const scene::Scene& scene) { return scene.slots.empty() ? 0 : scene.slots[0].size_m; }
-
 Result<Perception> Perception::create(const scene::Scene& scene,
                                       const Rig& rig,
                                       const PerceptionOptions& options) {
@@ -79,7 +77,8 @@ Result<Perception> Perception::create(const scene::Scene& scene,
   out.rig_ = rig;
   out.options_ = options;
   out.bodies_ = scene::bodies(scene);
-  out.loose_size_m_ = loose_size_m(scene);
+  out.constellations_ = scene::constellations(scene);
+  out.loose_size_m_ = scene::first_marker_size_m(scene);
   for (const Body& body : out.bodies_)
     for (const BodyMarker& marker : body.markers) out.used_.push_back(marker.marker);
   for (const scene::Control& control : scene.controls) out.used_.push_back(control.marker);
@@ -89,13 +88,18 @@ Result<Perception> Perception::create(const scene::Scene& scene,
   for (const scene::Control& control : scene.controls) {
     gestures.emplace_back(control.marker, control.gesture);
   }
-  for (const Imager& camera : rig.cameras)
-    out.camera_states_.push_back(
-        {tracker::Detector(families, {.encoding = tracker::encoding_of(rig, camera)}), gestures});
+  for (const Imager& camera : rig.cameras) {
+    const tracker::Encoding encoding = tracker::encoding_of(rig, camera);
+    out.camera_states_.push_back({.detector = tracker::Detector(families, {.encoding = encoding}),
+                                  .gestures = gestures,
+                                  .ball_finder = tracker::BallFinder({.encoding = encoding})});
+  }
   out.used_at_.resize(scene.controls.size());
   out.percepts_.frames.resize(rig.cameras.size());
   out.percepts_.detections.resize(rig.cameras.size());
   for (const tracker::FeedSetup& feed : options.feeds) out.feeds_.emplace_back(feed);
+  out.percepts_.screen_camera = rig.first_visible_camera();
+  if (!out.constellations_.empty()) out.percepts_.balls.resize(rig.cameras.size());
   return out;
 }
 
@@ -122,24 +126,39 @@ const Percepts& Perception::watch(std::span<const Frame> frames, const FeedInput
 
   note_loose(cameras);
   const auto filtering = std::chrono::steady_clock::now();
-  std::vector<tracker::View> views;
-  for (const std::size_t i : cameras) views.push_back({&rig_.cameras[i], percepts_.detections[i]});
-  if (!views.empty()) {
-    std::vector<Body> bodies = bodies_;
-    for (const Loose& loose : loose_)
-      if (loose.moments >= k_known_after)
-        bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
-    seen_ = tracker::observed(seen_, bodies, views, percepts_.captured_at, options_.motion);
-  }
-  if (!views.empty() || !input.is_empty()) {
-    percepts_.motions = seen_;
-    if (!feeds_.empty()) follow_feeds(!views.empty(), input);
-    percepts_.tracks = tracker::predicted(percepts_.motions, percepts_.captured_at,
-                                          tracker::Prediction::filtered, options_.motion);
-    follow_loose();
-  }
+  filter(cameras, input);
   percepts_.filter_ms = milliseconds_since(filtering);
   return percepts_;
+}
+
+// Bodies with markers and bodies with balls are filtered alike.
+void Perception::filter(std::span<const std::size_t> cameras, const FeedInput& input) {
+  if (cameras.empty() && input.is_empty()) return;
+  if (!cameras.empty()) filter_seen(cameras);
+  percepts_.motions = seen_;
+  if (!feeds_.empty()) follow_feeds(!cameras.empty(), input);
+  percepts_.tracks = tracker::predicted(percepts_.motions, percepts_.captured_at,
+                                        tracker::Prediction::filtered, options_.motion);
+  follow_loose();
+}
+
+void Perception::filter_seen(std::span<const std::size_t> cameras) {
+  std::vector<tracker::View> views;
+  std::vector<tracker::BallView> ball_views;
+  for (const std::size_t i : cameras) {
+    views.push_back({&rig_.cameras[i], percepts_.detections[i]});
+    if (!constellations_.empty()) ball_views.push_back({&rig_.cameras[i], percepts_.balls[i]});
+  }
+  std::vector<Body> bodies = bodies_;
+  for (const Loose& loose : loose_)
+    if (loose.moments >= k_known_after)
+      bodies.push_back({scene::loose_body(loose.marker), {{loose.marker, loose_size_m_, Pose()}}});
+  const Stamp at = percepts_.captured_at;
+  auto motions = tracker::observed(seen_, bodies, views, at, options_.motion);
+  std::ranges::move(
+      tracker::observed(seen_, constellations_, ball_views, at, options_.motion, options_.triple_pose),
+      std::back_inserter(motions));
+  seen_ = std::move(motions);
 }
 
 // Combines the cameras' motions with those that other tracking systems state. Their own stays without them,
@@ -170,18 +189,25 @@ void Perception::follow_feeds(bool has_frames, const FeedInput& input) {
   }
 }
 
+void Perception::update_camera(std::size_t camera, const Frame& frame) {
+  CameraState& state = camera_states_[camera];
+  percepts_.frames[camera] = frame;
+  state.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
+  if (!constellations_.empty())
+    percepts_.balls[camera] = state.ball_finder.find(state.grey, rig_.cameras[camera].lens);
+  if (!used_.empty()) find_markers(camera, frame.captured_at);
+}
+
 // Follows known markers near their predicted positions. Searches the whole image for others from time to
 // time, and when a marker is gone.
-void Perception::update_camera(std::size_t camera, const Frame& frame) {
+void Perception::find_markers(std::size_t camera, Stamp captured_at) {
   CameraState& state = camera_states_[camera];
   const Lens* lens = &rig_.cameras[camera].lens;
   std::vector<tracker::Detection>& detections = percepts_.detections[camera];
-  percepts_.frames[camera] = frame;
-  state.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
-  const double seconds = seconds_between(state.seen_at, frame.captured_at);
+  const double seconds = seconds_between(state.seen_at, captured_at);
   const std::vector<tracker::Detection> next =
       predicted_detections(detections, state.before, seconds, std::exchange(state.seconds, seconds));
-  state.seen_at = frame.captured_at;
+  state.seen_at = captured_at;
   std::swap(state.before, detections);
   state.detector.follow(state.grey, lens, next, &detections);
   const bool is_one_gone = detections.size() < next.size();

@@ -12,6 +12,8 @@
 #include "core/rig.h"
 #include "core/track.h"
 #include "scene/scene.h"
+#include "tracker/balls/ball_finder.h"
+#include "tracker/balls/constellation_filter.h"
 #include "tracker/body_filter.h"
 #include "tracker/detector.h"
 #include "tracker/feeds/foreign_tracker.h"
@@ -54,7 +56,9 @@ struct FeedInput {
 struct Percepts {
   std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
   std::vector<std::vector<tracker::Detection>> detections;  ///< in these frames, one list per camera
-  std::vector<tracker::BodyFilter> motions;                 ///< by the cameras and other tracking systems
+  std::vector<std::vector<tracker::Ball>> balls;  ///< in these frames; empty when the scene has none
+  std::size_t screen_camera = 0;  ///< the first camera that sees visible light: screens show its frames
+  std::vector<tracker::BodyFilter> motions;  ///< by the cameras and other tracking systems
   std::vector<LooseMarker> loose;  ///< tracked loose markers, the one that is still for longest first
   std::vector<ControlUse> uses;    ///< control uses of this moment
   std::vector<tracker::FeedStatus> feeds = {};  ///< how far other tracking systems can be used
@@ -70,16 +74,13 @@ struct PerceptionOptions {
   /// Higher is faster and finds new markers later.
   int full_scan_every = 3;
   tracker::MotionModel motion;
+  tracker::TriplePose triple_pose = tracker::TriplePose::refined;
   int most_loose = 8;                          ///< at most so many loose markers; further ones are ignored
   std::vector<tracker::FeedSetup> feeds = {};  ///< other tracking systems
 };
 
-/// The side that loose markers are assumed to have: that of the scene's first slot, m. 0 without slots: loose
-/// markers are ignored.
-double loose_size_m(const scene::Scene& scene);
-
-/// The camera side of a session: frames -> markers -> motions of bodies, and gestures of control markers. Its
-/// only clock is the frames' stamps, so the same frames give the same results.
+/// The camera side of a session: frames -> markers and balls -> motions of bodies, and gestures of control
+/// markers. Its only clock is the frames' stamps, so the same frames give the same results.
 class Perception {
  public:
   /// Error: a family that cannot be loaded.
@@ -105,6 +106,7 @@ class Perception {
     Stamp seen_at = {};                           // stamp of the newest image
     double seconds = 0;                           // time between the last two images
     cv::Mat grey = {};                            // the newest image
+    tracker::BallFinder ball_finder = tracker::BallFinder();
   };
   struct Loose {
     MarkerName marker;
@@ -115,6 +117,9 @@ class Perception {
   };
   Perception() = default;
   void update_camera(std::size_t camera, const Frame& frame);
+  void find_markers(std::size_t camera, Stamp captured_at);
+  void filter(std::span<const std::size_t> cameras, const FeedInput& input);
+  void filter_seen(std::span<const std::size_t> cameras);
   bool all_are_seen() const;
   void note_loose(std::span<const std::size_t> cameras);
   void follow_loose();
@@ -124,6 +129,7 @@ class Perception {
   Rig rig_;
   PerceptionOptions options_;
   std::vector<Body> bodies_;
+  std::vector<Constellation> constellations_;
   double loose_size_m_ = 0;
   std::vector<MarkerName> used_;  // markers of bodies and controls
   std::vector<Loose> loose_;

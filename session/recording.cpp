@@ -97,6 +97,7 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
             {"starts_per_s", motion.starts_per_s},
             {"stops_per_s", motion.stops_per_s},
             {"extrapolation_limit_s", motion.extrapolation_limit_s}}},
+          {"triple_pose", tracker::k_triple_poses.text(setup.watch.triple_pose)},
           {"prediction", tracker::k_predictions.text(paint.prediction)},
           {"marker_light", tracker::k_marker_lights.text(paint.marker_light)},
           {"fade_s", paint.fade_s},
@@ -304,8 +305,9 @@ Result<Frame> load_frame(const fs::path& file) {
 Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(const Config config, Config::load(folder / "session.json", "limn.session/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "rig", "scene", "full_scan_every", "motion", "prediction", "marker_light", "fade_s",
-             "label_s", "lost_s", "stereo_mm", "stereo_projectors", "refill", "screens", "feeds"});
+  root.only({"schema", "rig", "scene", "full_scan_every", "motion", "triple_pose", "prediction",
+             "marker_light", "fade_s", "label_s", "lost_s", "stereo_mm", "stereo_projectors", "refill",
+             "screens", "feeds"});
   SessionSetup setup;
   setup.watch.full_scan_every = root.at("full_scan_every").integer();
   if (setup.watch.full_scan_every < 1) root.at("full_scan_every").problem("expected 1 or more, found less.");
@@ -319,6 +321,8 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   model.stops_per_s = motion.at("stops_per_s").positive();
   model.extrapolation_limit_s = motion.at("extrapolation_limit_s").positive();
   setup.paint.motion = model;
+  if (const auto method = root.find("triple_pose"))
+    setup.watch.triple_pose = tracker::k_triple_poses.read(*method);
   setup.paint.prediction = tracker::k_predictions.read(root.at("prediction"));
   setup.paint.marker_light = tracker::k_marker_lights.read(root.at("marker_light"));
   setup.paint.fade_s = root.at("fade_s").positive();

@@ -31,6 +31,11 @@ bool have_same_markers(const scene::Scene& a, const scene::Scene& b) {
       }
       text += "\n";
     }
+    for (const Constellation& balls : scene::constellations(scene)) {
+      text += fmt::format("{}: {}", balls.name, balls.radius_m);
+      for (const Eigen::Vector3d& p : balls.p_balls) text += fmt::format(" {} {} {}", p.x(), p.y(), p.z());
+      text += "\n";
+    }
     for (const scene::Control& control : scene.controls)
       text += fmt::format("{} {} {} {}\n", control.marker.text(), scene::action_of(control.action).name,
                           control.slot, k_gestures.text(control.gesture));

@@ -25,7 +25,9 @@ EyeImages ScreenComposer::images(const ScreenInput& input,
                                  const ScreenRequest& request,
                                  projector::Renderer* renderer) {
   using enum scene::Screen;
-  if (request.what == off || input.cameras.empty() || input.cameras[0].frame.image.empty()) return {};
+  if (request.what == off || input.cameras.size() <= screen_camera() ||
+      input.cameras[screen_camera()].frame.image.empty())
+    return {};
   const bool is_view = request.what == view || request.what == stereo;
   return is_view || (request.wall && request.what != camera) ? views(input, request, renderer)
                                                              : composites(input, request, renderer);
@@ -35,7 +37,7 @@ EyeImages ScreenComposer::images(const ScreenInput& input,
 EyeImages ScreenComposer::composites(const ScreenInput& input,
                                      const ScreenRequest& request,
                                      projector::Renderer* renderer) {
-  std::array<std::size_t, 2> eyes{0, 0};
+  std::array<std::size_t, 2> eyes{screen_camera(), screen_camera()};
   const auto has_image = [&](std::size_t camera) {
     return camera < input.cameras.size() && !input.cameras[camera].frame.image.empty();
   };
@@ -54,7 +56,7 @@ EyeImages ScreenComposer::composites(const ScreenInput& input,
 EyeImages ScreenComposer::views(const ScreenInput& input,
                                 const ScreenRequest& request,
                                 projector::Renderer* renderer) const {
-  const Imager viewer = input.viewer.width > 0 ? input.viewer : rig_->cameras[0];
+  const Imager viewer = input.viewer.width > 0 ? input.viewer : rig_->cameras[screen_camera()];
   const auto seen_by = [&](const Imager& eye) -> std::optional<Imager> {
     if (!request.wall) return eye;
     return seen_through(*request.wall, eye.imager_from_world.inverse().translation, request.wall_pixels);
@@ -66,9 +68,9 @@ EyeImages ScreenComposer::views(const ScreenInput& input,
     const auto draw = [&](const scene::PosedScene& posed) {
       return renderer->view(*from, posed, k_background);
     };
-    return {with_split(input, 0, *from, draw, draw)};
+    return {with_split(input, screen_camera(), *from, draw, draw)};
   }
-  const scene::PosedScene posed = this->posed(input, 0);
+  const scene::PosedScene posed = this->posed(input, screen_camera());
   const auto [left, right] = eyes(viewer, 1e-3 * options_.stereo_mm);
   const auto from_left = seen_by(left), from_right = seen_by(right);
   if (!from_left || !from_right) return {};

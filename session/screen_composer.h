@@ -31,7 +31,7 @@ struct TrackedFrame {
 struct ScreenInput {
   std::span<const TrackedFrame> cameras;  ///< in the rig's order
   const scene::ShowState& show_state;
-  const Imager& viewer;            ///< viewpoint that `view` parts are drawn for; width 0: camera 0's
+  const Imager& viewer;  ///< viewpoint that `view` parts are drawn for; width 0: the screen camera's
   const scene::PosedScene& shown;  ///< the scene as it is projected; parts at rest are drawn at its poses
 };
 
@@ -70,6 +70,8 @@ class ScreenComposer {
                      const Draw& draw,
                      const Draw& draw_other) const;
   const std::optional<projector::StereoCameras>& stereo_cameras();
+  // The camera whose images are shown to one eye. A rig without cameras has no images.
+  std::size_t screen_camera() const { return rig_->first_visible_camera(); }
 
   const scene::Scene* scene_;
   const Rig* rig_;

@@ -202,6 +202,7 @@ ShownFrame Session::measured() const {
                  .screen_ms = -1,
                  .record_ms = record_ms_};
   for (const auto& detections : percepts_.detections) out.markers += static_cast<int>(detections.size());
+  for (const auto& balls : percepts_.balls) out.markers += static_cast<int>(balls.size());
   for (const Track& track : composed.tracks)
     out.lost += track.tracking == TrackingState::lost && !scene::is_loose_body(track.body);
   return out;

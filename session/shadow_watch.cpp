@@ -27,6 +27,7 @@ void ShadowWatch::update(const Percepts& percepts,
   for (std::size_t i = 0; i < percepts.frames.size(); ++i) {
     const Frame& frame = percepts.frames[i];
     if (frame.image.empty() || frame.captured_at <= seen_at_[i]) continue;
+    if (rig_.cameras[i].sees != Spectrum::visible) continue;  // it sees no projected light
     seen_at_[i] = frame.captured_at;
     if (const auto* images = shown.at(frame.captured_at))
       has_changed |= arriving_.update_maps(i, frame.image, *images);

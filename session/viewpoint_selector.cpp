@@ -39,7 +39,7 @@ const Imager* ViewpointSelector::still_viewer() const {
 
 // The viewpoint that is used until a viewer is seen.
 const Imager& ViewpointSelector::substitute_viewer() const {
-  return rig_->cameras.empty() ? rig_->projectors[0] : rig_->cameras[0];
+  return rig_->cameras.empty() ? rig_->projectors[0] : rig_->cameras[rig_->first_visible_camera()];
 }
 
 // Viewpoints of guests whose tablets have seen markers recently: only that of the followed guest, or else

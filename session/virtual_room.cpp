@@ -59,6 +59,13 @@ Eigen::Vector3d middle_of_sight(const Rig& rig, double prototype_size_m) {
   return camera.imager_from_world.inverse() * Eigen::Vector3d(0, 0, depth);
 }
 
+// How far the balls reach in the direction of z.
+double depth_of(const Constellation& balls) {
+  double depth = 0;
+  for (const Eigen::Vector3d& p : balls.p_balls) depth = std::max(depth, p.z() + balls.radius_m);
+  return depth;
+}
+
 // Poses for the slots' markers on the mesh, from its middle outwards, without overlap.
 std::vector<BodyMarker> slot_markers(const scene::Scene& scene,
                                      const Eigen::Quaterniond& prototype_from_face) {
@@ -67,20 +74,22 @@ std::vector<BodyMarker> slot_markers(const scene::Scene& scene,
   const double front = 0.5 * box.sizes().minCoeff();
   std::vector<BodyMarker> all = prototype.markers, placed;
   for (const scene::Slot& slot : scene.slots) {
+    const double size_m = slot.constellation ? 2 * reach_of(*slot.constellation) : slot.size_m;
+    const double height_m = slot.constellation ? depth_of(*slot.constellation) : k_paper_m;
     for (int step = 0; step < 400; ++step) {  // outwards on a spiral
-      const double turn = 2.4 * step, radius = 0.5 * slot.size_m * std::sqrt(step);
+      const double turn = 2.4 * step, radius = 0.5 * size_m * std::sqrt(step);
       const Eigen::Vector3d in_face(radius * std::cos(turn), radius * std::sin(turn), -front);
       const scene::MeshPoint on =
           scene::nearest_on(prototype.mesh, box.center() + prototype_from_face * in_face);
       const Eigen::Vector3d d_face = prototype_from_face * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d d_in = on.d_normal.dot(d_face) > 0 ? on.d_normal : -on.d_normal;
-      const Pose at(rotation_between(d_face, d_in) * prototype_from_face, on.p - k_paper_m * d_in);
+      const Pose at(rotation_between(d_face, d_in) * prototype_from_face, on.p - height_m * d_in);
       const bool is_free = std::none_of(all.begin(), all.end(), [&](const BodyMarker& other) {
         return (other.body_from_marker.translation - at.translation).norm() <
-               0.5 * k_spacing * (other.size_m + slot.size_m);
+               0.5 * k_spacing * (other.size_m + size_m);
       });
       if (!is_free && step < 399) continue;
-      placed.push_back({slot.marker, slot.size_m, at});
+      placed.push_back({slot.marker, size_m, at});
       all.push_back(placed.back());
       break;
     }
@@ -142,8 +151,15 @@ Result<sim::World> room_for(const Rig& rig, const scene::Scene& scene) {
   world.objects.push_back(std::move(prototype));
   for (BodyMarker marker : scene.prototype->markers)
     LIMN_TRY_STATUS(sim::add_marker(world, marker, true, tracker::marker_image));
-  for (const BodyMarker& marker : slot_markers(scene, from_face))
-    LIMN_TRY_STATUS(sim::add_marker(world, marker, true, tracker::marker_image));
+  if (const auto& balls = scene.prototype->constellation)
+    sim::add_balls(world, {k_constellation_family, "prototype"}, *balls, Pose(), true);
+  const std::vector<BodyMarker> placed = slot_markers(scene, from_face);
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    if (const auto& balls = scene.slots[i].constellation)
+      sim::add_balls(world, placed[i].marker, *balls, placed[i].body_from_marker, true);
+    else
+      LIMN_TRY_STATUS(sim::add_marker(world, placed[i], true, tracker::marker_image));
+  }
   for (const BodyMarker& marker : control_markers(scene, from_face))
     LIMN_TRY_STATUS(sim::add_marker(world, marker, true, tracker::marker_image));
   return world;

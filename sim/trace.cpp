@@ -65,7 +65,8 @@ bool is_same(const Pose& a, const Pose& b) {
 
 bool is_same_imager(const Imager& a, const Imager& b) {
   return a.name == b.name && a.width == b.width && a.height == b.height && a.lens.model == b.lens.model &&
-         a.lens.values == b.lens.values && is_same(a.imager_from_world, b.imager_from_world);
+         a.lens.values == b.lens.values && is_same(a.imager_from_world, b.imager_from_world) &&
+         a.sees == b.sees;
 }
 
 bool is_same_lamp(const Lamp& a, const Lamp& b) {
@@ -76,7 +77,7 @@ bool is_same_lamp(const Lamp& a, const Lamp& b) {
 bool is_same_thing(const Object& a, const Object& b) {
   return a.name == b.name && a.mesh == b.mesh && a.albedo == b.albedo && a.ink_albedo == b.ink_albedo &&
          a.texture.data == b.texture.data && a.sharp_texture == b.sharp_texture &&
-         a.by_material == b.by_material;
+         a.retroreflection == b.retroreflection && a.by_material == b.by_material;
 }
 
 std::vector<MeshInstance> placed(const std::vector<Object>& objects) {
@@ -95,8 +96,12 @@ class Tracer {
         scene_(placed(world.objects), moves),
         directions_(imager_),
         p_camera_(imager_.imager_from_world.inverse().translation) {
-    for (const Lamp& lamp : world.room.lamps)
-      for (const LampPoint& point : points_of(lamp, effort.lamp_points)) lamps_.push_back(point);
+    if (imager_.sees == Spectrum::infrared) {
+      lamps_.push_back({p_camera_, 1});  // the lamp around its lens
+    } else {
+      for (const Lamp& lamp : world.room.lamps)
+        for (const LampPoint& point : points_of(lamp, effort.lamp_points)) lamps_.push_back(point);
+    }
     for (const Imager& projector : world.rig.projectors)
       p_projectors_.push_back(projector.imager_from_world.inverse().translation);
     samples_.camera = camera;
@@ -214,6 +219,13 @@ class Tracer {
     return s.n_face.dot(p_light.cast<float>() - s.p) > 0;
   }
 
+  // Whether a projector's light reaches the surfaces; a camera for infrared light does not see it.
+  std::vector<std::uint8_t> projector_reaches(std::size_t projector,
+                                              std::span<const Surface> surfaces) const {
+    if (imager_.sees == Spectrum::infrared) return std::vector<std::uint8_t>(surfaces.size(), 0);
+    return reached_from(p_projectors_[projector], surfaces);
+  }
+
   std::vector<std::uint8_t> reached_from(const Eigen::Vector3d& p_light,
                                          std::span<const Surface> surfaces) const {
     std::vector<Eigen::Vector3f> points;
@@ -229,12 +241,15 @@ class Tracer {
   float lamp_light(const LampPoint& lamp, const Surface& s) const {
     const Eigen::Vector3f towards = lamp.p_world.cast<float>() - s.p;
     const float d2 = towards.squaredNorm();
+    const double returned = world_->objects[static_cast<std::size_t>(s.object)].retroreflection;
+    if (imager_.sees == Spectrum::infrared && returned > 0) return static_cast<float>(returned) / d2;
     return static_cast<float>(lamp.illuminance_at_1m) * std::max(0.0F, s.n.dot(towards) / std::sqrt(d2)) / d2;
   }
   float ambient_light(const Surface& s) const {
-    return s.object < 0 ? 0
-                        // More light from above.
-                        : static_cast<float>(world_->room.ambient) * (0.75F + 0.25F * s.n.z());
+    return s.object < 0 || imager_.sees == Spectrum::infrared
+               ? 0
+               // More light from above.
+               : static_cast<float>(world_->room.ambient) * (0.75F + 0.25F * s.n.z());
   }
 
   // Traces the pixel centres and corners of these blocks, and finds their edges.
@@ -277,7 +292,7 @@ class Tracer {
 
   void light_row(std::span<const Surface> row, std::size_t at) {
     for (std::size_t k = 0; k < reached_.size(); ++k) {
-      const std::vector<std::uint8_t> result = reached_from(p_projectors_[k], row);
+      const std::vector<std::uint8_t> result = projector_reaches(k, row);
       std::copy(result.begin(), result.end(), reached_[k].begin() + static_cast<std::ptrdiff_t>(at));
     }
     for (std::size_t i = 0; i < row.size(); ++i) room_[at + i] = ambient_light(row[i]);
@@ -351,8 +366,7 @@ class Tracer {
     }
     const std::vector<Surface> found = surfaces(d);
     std::vector<std::vector<std::uint8_t>> reached_by;
-    for (const Eigen::Vector3d& p_projector : p_projectors_)
-      reached_by.push_back(reached_from(p_projector, found));
+    for (std::size_t k = 0; k < p_projectors_.size(); ++k) reached_by.push_back(projector_reaches(k, found));
     std::vector<float> room(found.size());
     for (std::size_t k = 0; k < found.size(); ++k) room[k] = ambient_light(found[k]);
     for (const LampPoint& lamp : lamps_) {

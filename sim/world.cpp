@@ -1,7 +1,10 @@
 #include "sim/world.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <opencv2/core.hpp>
 #include <set>
 #include <utility>
@@ -91,7 +94,7 @@ Eigen::Matrix3d read_sensitivity(const ConfigNode& node) {
 CameraEffects read_camera_effects(const ConfigNode& node) {
   node.only({"name", "size", "lens", "imager_from_world", "eye_m", "target_m", "colour", "exposure", "psf_px",
              "vignetting", "full_well_e", "read_noise", "black_level", "shake_px", "flicker", "encoding",
-             "sensitivity"});
+             "sensitivity", "sees"});
   CameraEffects effects;
   effects.exposure = node.at("exposure").positive();
   if (const auto v = node.find("colour")) effects.colour = v->boolean();
@@ -104,6 +107,8 @@ CameraEffects read_camera_effects(const ConfigNode& node) {
   if (const auto v = node.find("flicker")) effects.flicker = share(*v);
   if (const auto v = node.find("encoding")) effects.srgb = v->choice({"linear", "srgb"}) == "srgb";
   if (const auto v = node.find("sensitivity")) effects.sensitivity = read_sensitivity(*v);
+  if (const auto v = node.find("sees"); v && k_spectra.read(*v) == Spectrum::infrared && effects.colour)
+    v->problem("expected visible light for a colour camera, found infrared. Remove \"colour\".");
   return effects;
 }
 
@@ -141,6 +146,7 @@ void read_devices(const ConfigNode& root, World* world) {
   std::set<std::string> names;
   for (const ConfigNode& node : root.at("cameras").items()) {
     world->rig.cameras.push_back(read_imager(node));
+    if (const auto sees = node.find("sees")) world->rig.cameras.back().sees = k_spectra.read(*sees);
     world->camera_effects.push_back(read_camera_effects(node));
     own_name(node, world->rig.cameras.back().name, &names);
   }
@@ -198,6 +204,44 @@ std::shared_ptr<const scene::Mesh> box_mesh(const Eigen::Vector3d& size) {
   return mesh;
 }
 
+// Adds a sphere whose triangles' volume is that of the sphere: the faces of an icosahedron, each divided in
+// four several times.
+void add_sphere(const Eigen::Vector3d& p, double radius, scene::Mesh* mesh) {
+  constexpr int k_divisions = 4;        // 5120 triangles: the outline deviates by .0006 of the radius at most
+  constexpr double k_volume = 1.00061;  // the radius's factor
+  const double g = 0.5 * (1 + std::sqrt(5.0));
+  std::vector<Eigen::Vector3d> d = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0},
+                                    {0, -1, g}, {0, 1, g}, {0, -1, -g}, {0, 1, -g},
+                                    {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
+  using Triangle = std::array<std::uint32_t, 3>;
+  std::vector<Triangle> faces = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11},
+                                 {1, 5, 9},  {5, 11, 4}, {11, 10, 2}, {10, 7, 6}, {7, 1, 8},
+                                 {3, 9, 4},  {3, 4, 2},  {3, 2, 6},   {3, 6, 8},  {3, 8, 9},
+                                 {4, 9, 5},  {2, 4, 11}, {6, 2, 10},  {8, 6, 7},  {9, 8, 1}};
+  for (Eigen::Vector3d& one : d) one.normalize();
+  for (int i = 0; i < k_divisions; ++i) {
+    std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
+    const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+      const auto [at, is_new] = middles.try_emplace(std::minmax(a, b), static_cast<std::uint32_t>(d.size()));
+      if (is_new) d.push_back((d[a] + d[b]).normalized());
+      return at->second;
+    };
+    std::vector<Triangle> finer;
+    for (const auto& [a, b, c] : faces) {
+      const std::uint32_t ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+      finer.insert(finer.end(), {{a, ab, ca}, {b, bc, ab}, {c, ca, bc}, {ab, bc, ca}});
+    }
+    faces = std::move(finer);
+  }
+  const auto first = static_cast<std::uint32_t>(mesh->positions.size());
+  for (const Eigen::Vector3d& one : d) {
+    mesh->positions.push_back((p + k_volume * radius * one).cast<float>());
+    mesh->normals.push_back(one.cast<float>());
+  }
+  for (const auto& [a, b, c] : faces) mesh->triangles.push_back({first + a, first + b, first + c});
+  mesh->triangle_materials.resize(mesh->triangles.size(), 0);
+}
+
 // Reads a number or [red, green, blue].
 Eigen::Vector3d read_albedo(const ConfigNode& node) {
   if (!node.is_array()) return Eigen::Vector3d::Constant(share(node));
@@ -228,6 +272,14 @@ Object read_object(const ConfigNode& node, const Pose& world_from_prototype) {
   }
   object.mesh = node.find("rectangle_m") ? sheet_mesh(size.x(), size.y()) : box_mesh(size);
   return object;
+}
+
+BallPaint read_ball_paint(const ConfigNode& node) {
+  node.only({"albedo", "retroreflection"});
+  BallPaint paint;
+  if (const auto albedo = node.find("albedo")) paint.albedo = share(*albedo);
+  if (const auto factor = node.find("retroreflection")) paint.retroreflection = at_most(1e4, *factor);
+  return paint;
 }
 
 MarkerPaper read_paper(const ConfigNode& node) {
@@ -325,6 +377,10 @@ Status add_slot_markers(World& world,
       return error(
           "{}: slot_markers: expected slots of the scene, found '{}'. Compare with the scene's scene.json.",
           file, place.slot);
+    if (slot->constellation) {
+      add_balls(world, slot->marker, *slot->constellation, place.pose, place.on_prototype);
+      continue;
+    }
     LIMN_TRY_STATUS(
         add_plate(world, {slot->marker, slot->size_m, place.pose}, place.on_prototype, draw, paper));
   }
@@ -346,6 +402,8 @@ Status add_scene(World& world,
     object.albedo.setConstant(prototype.albedo_image.empty() ? prototype.albedo : 1.0);
     object.texture = prototype.albedo_image;
     world.objects.push_back(std::move(object));
+    if (const auto& balls = prototype.constellation)
+      add_balls(world, {k_constellation_family, "prototype"}, *balls, Pose(), true);
     for (const BodyMarker& marker : prototype.markers)
       LIMN_TRY_STATUS(add_plate(world, marker, true, draw, paper));
   }
@@ -364,7 +422,7 @@ Result<World> load_world(const std::filesystem::path& path,
   LIMN_TRY(const Config config, Config::load(path, "limn.world/1"));
   const ConfigNode root = config.root();
   root.only({"schema", "seed", "scene", "world_from_prototype", "slot_markers", "loose_markers",
-             "marker_paper", "cameras", "projectors", "room", "objects"});
+             "marker_paper", "balls", "cameras", "projectors", "room", "objects"});
   World world;
   read_devices(root, &world);
   world.room = read_room(root.at("room"));
@@ -379,6 +437,7 @@ Result<World> load_world(const std::filesystem::path& path,
   }
   MarkerPaper paper;
   if (const auto node = root.find("marker_paper")) paper = read_paper(*node);
+  if (const auto node = root.find("balls")) world.ball_paint = read_ball_paint(*node);
   std::vector<SlotPlace> places;
   std::vector<LoosePlace> loose;
   if (const auto markers = root.find("loose_markers")) loose = read_loose_places(*markers);
@@ -429,6 +488,24 @@ Status add_marker(World& world,
                   bool attached_to_prototype,
                   const MarkerImage& marker_image) {
   return add_plate(world, marker, attached_to_prototype, marker_image, {});
+}
+
+void add_balls(World& world,
+               const MarkerName& name,
+               const Constellation& balls,
+               const Pose& pose,
+               bool attached_to_prototype) {
+  auto mesh = std::make_shared<scene::Mesh>();
+  for (const Eigen::Vector3d& p : balls.p_balls) add_sphere(p, balls.radius_m, mesh.get());
+  Object object;
+  object.name = "marker-" + name.text();
+  object.mesh = std::move(mesh);
+  object.albedo.setConstant(world.ball_paint.albedo);
+  object.retroreflection = world.ball_paint.retroreflection;
+  object.world_from_object = attached_to_prototype ? world.world_from_prototype * pose : pose;
+  if (attached_to_prototype) object.prototype_from_object = pose;
+  world.markers.push_back({name, 2 * reach_of(balls), object.name});
+  world.objects.push_back(std::move(object));
 }
 
 void move_prototype(World& world, const Pose& world_from_prototype) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "core/constellation.h"
 #include "core/marker.h"
 #include "core/marker_drawing.h"
 #include "core/result.h"
@@ -63,14 +64,17 @@ struct Object {
   double ink_albedo = 0;                     ///< Reflectance where the texture is black.
   cv::Mat texture;                           ///< 8-bit sRGB, grey or BGR, in the mesh's uv; empty: plain.
   bool sharp_texture = false;                ///< Pixels are small squares (printed cells), not interpolated.
-  bool by_material = false;                  ///< Uses the mesh's own materials instead of albedo and texture.
+  /// Light that returns to a lamp beside the camera, as a multiple of what a white matt surface returns that
+  /// faces the camera; it does not depend on the surface's tilt. 0: the object is diffuse only.
+  double retroreflection = 0;
+  bool by_material = false;  ///< Uses the mesh's own materials instead of albedo and texture.
   std::optional<Pose> prototype_from_object;  ///< When set, the object moves with the prototype.
 };
 
-/// A physical marker in the world. Its frame is that of its object.
+/// A physical marker or constellation in the world. Its frame is that of its object.
 struct PlacedMarker {
   MarkerName marker;
-  double size_m = 0;
+  double size_m = 0;  ///< the marker's side, or twice the constellation's reach
   std::string object;
 };
 
@@ -81,10 +85,18 @@ struct Lamp {
   double radius_m = 0;
 };
 
-/// Light of the room other than from projectors. The ambient part reaches every surface, more from above.
+/// Light of the room other than from projectors, which are no infrared light: a camera with
+/// Spectrum::infrared sees only what a lamp around its lens lights, of illuminance 1 at 1 m. The ambient part
+/// reaches every surface, more from above.
 struct Room {
   double ambient = 0;
   std::vector<Lamp> lamps;
+};
+
+/// The surface of balls.
+struct BallPaint {
+  double albedo = 0.85;
+  double retroreflection = 0;  ///< as in Object
 };
 
 /// Everything that the virtual rig knows to be true. World frame: metres, z up, z = 0 is the table's top.
@@ -95,6 +107,7 @@ struct World {
   std::vector<Object> objects;
   std::vector<PlacedMarker> markers;
   Room room;
+  BallPaint ball_paint;
   std::uint64_t seed = 1;
 
   std::optional<scene::Scene> scene;  ///< The virtual content. Its parts are NOT among the objects.
@@ -130,6 +143,13 @@ Status add_marker(World& world,
                   const BodyMarker& marker,
                   bool attached_to_prototype,
                   const MarkerImage& marker_image);
+
+/// Adds the balls of a constellation as one object, in the constellation's frame.
+void add_balls(World& world,
+               const MarkerName& name,
+               const Constellation& balls,
+               const Pose& pose,
+               bool attached_to_prototype);
 
 /// Moves the prototype and everything attached to it.
 void move_prototype(World& world, const Pose& world_from_prototype);

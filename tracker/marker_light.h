@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/constellation.h"
 #include "core/enum_names.h"
 #include "core/imager.h"
 #include "core/marker.h"
@@ -28,6 +29,19 @@ cv::Mat marker_mask(const Imager& projector,
                     std::span<const Body> bodies,
                     std::span<const Track> tracks,
                     const MarkerLightOptions& options = {});
+
+/// The same for balls: their outlines, widened by `margin` of their diameter and by `deviations`.
+cv::Mat ball_mask(const Imager& projector,
+                  std::span<const Constellation> constellations,
+                  std::span<const Track> tracks,
+                  const MarkerLightOptions& options = {});
+
+/// The tracks of those bodies of which the image of a camera for visible light can show a marker or a ball.
+/// Projected light does not disturb the others: only cameras for infrared light see them.
+std::vector<Track> seen_in_visible_light(std::span<const Imager> cameras,
+                                         std::span<const Body> bodies,
+                                         std::span<const Constellation> constellations,
+                                         std::span<const Track> tracks);
 
 /// How a projector's image treats markers.
 enum class MarkerLight {

@@ -37,7 +37,8 @@ std::vector<Place> all_series(const CaptureSet& captures) {
   for (size_t pose = 0; pose < captures.poses.size(); ++pose) {
     for (size_t projector = 0; projector < captures.projectors.size(); ++projector) {
       for (size_t camera = 0; camera < captures.cameras.size(); ++camera)
-        all.push_back({pose, projector, camera});
+        if (captures.cameras[camera].sees == Spectrum::visible)  // others see the same in each image
+          all.push_back({pose, projector, camera});
     }
   }
   return all;

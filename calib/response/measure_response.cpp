@@ -30,6 +30,7 @@ Result<std::vector<Pair>> sampled_pairs(const CaptureSet& captures, std::vector<
   std::vector<Pair> all;
   std::vector<std::pair<int, Error>> failed;
   for (const ResponsePair& pair : pairs) {
+    if (captures.cameras[static_cast<size_t>(pair.camera)].sees != Spectrum::visible) continue;
     LIMN_TRY(const ResponseShots shots, read_response_shots(captures, pair));
     auto samples = sampled(shots, k_most_of_curve);
     if (samples) all.push_back({pair, std::move(*samples)});

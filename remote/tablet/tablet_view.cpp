@@ -71,7 +71,8 @@ std::vector<Body> bodies_of(const scene::Scene& scene, const scene::ShowState& s
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     const MarkerName& carrier = scene::slot_marker(scene, show_state, i);
-    const double size_m = carrier == slot.marker ? slot.size_m : session::loose_size_m(scene);
+    if (is_constellation(carrier)) continue;  // a tablet finds square markers only
+    const double size_m = carrier == slot.marker ? slot.size_m : scene::first_marker_size_m(scene);
     out.push_back({slot.name, {{carrier, size_m, Pose()}}});
   }
   return out;
@@ -397,7 +398,7 @@ CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot
   if (snapshot.room.image.empty()) return without("The room's camera has shown nothing yet.");
   cv::Mat image = snapshot.paint.is_linear_camera ? srgb_image(snapshot.room.image) : snapshot.room.image;
   if (image.channels() == 1) cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
-  Imager camera = rig.cameras[0];
+  Imager camera = rig.cameras[rig.first_visible_camera()];
   const double scale = 1.0 * k_drawn_side / std::max(image.cols, image.rows);
   if (scale < 1) {
     const cv::Size size(cvRound(scale * image.cols), cvRound(scale * image.rows));
@@ -463,7 +464,7 @@ void TabletView::update_session(const session::Session& session) {
                       .show_state = session.show_state(),
                       .tracks = session.prediction().at_image,
                       .paint = session.setup().paint,
-                      .room = percepts.frames.empty() ? Frame{} : percepts.frames[0],
+                      .room = percepts.frames.empty() ? Frame{} : percepts.frames[percepts.screen_camera],
                       .follows = session.composed().follows});
   const std::lock_guard lock(impl_->mutex);
   impl_->newest_snapshot = std::move(snapshot);

@@ -25,7 +25,7 @@ struct Photographs {
   std::vector<std::filesystem::path> images;
   std::vector<Pose> camera_from_body;
 
-  Photographs(const tracker::Constellation& truth, int count) {
+  Photographs(const Constellation& truth, int count) {
     auto rng = test::test_rng();
     EXPECT_TRUE(save_cameramodel(camera, folder / "camera0.cameramodel"));
     for (int i = 0; i < count; ++i) {
@@ -42,7 +42,7 @@ struct Photographs {
 };
 
 TEST(Balls, AConstellationIsLearnedAndFoundAgain) {
-  const tracker::Constellation truth = test::five_balls();
+  const Constellation truth = test::five_balls();
   const Photographs photographs(truth, 12);
   LearnConstellationOptions options;
   options.images = photographs.images;
@@ -50,7 +50,7 @@ TEST(Balls, AConstellationIsLearnedAndFoundAgain) {
   options.out = photographs.folder / "wand.json";
   const Status status = run_learn_constellation(options);
   ASSERT_TRUE(status) << status.message();
-  const auto learned = tracker::load_constellation(options.out);
+  const auto learned = load_constellation(options.out);
   ASSERT_TRUE(learned) << learned.message();
   EXPECT_EQ(learned->name, "wand");
   EXPECT_DOUBLE_EQ(learned->radius_m, 0.02);

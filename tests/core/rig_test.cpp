@@ -146,5 +146,19 @@ TEST(Rig, WhatWasThereStaysWhenTheFolderCannotBeWritten) {
   EXPECT_NE(status.message().find("writable"), std::string::npos) << status.message();
 }
 
+TEST(Rig, WhatACameraSeesIsKept) {
+  Rig rig;
+  for (const char* name : {"camera0", "camera1"})
+    rig.cameras.push_back({name, 1280, 720, Lens::pinhole(900, 900, 639.5, 359.5), Pose()});
+  EXPECT_EQ(rig.first_visible_camera(), 0u);
+  rig.cameras[0].sees = Spectrum::infrared;
+  const std::filesystem::path folder = test::test_folder() / "rig";
+  ASSERT_TRUE(save_rig(rig, folder));
+  const Rig loaded = load_rig(folder).value();
+  EXPECT_EQ(loaded.cameras[0].sees, Spectrum::infrared);
+  EXPECT_EQ(loaded.cameras[1].sees, Spectrum::visible);
+  EXPECT_EQ(loaded.first_visible_camera(), 1u);
+}
+
 }  // namespace
 }  // namespace limn

@@ -146,5 +146,15 @@ TEST(Devices, OfAnotherRigAreRefusedAndNamed) {
       "projector0: expected the rig's size 1920x1080, found 1280x800");
 }
 
+TEST(Devices, ACameraMaySeeInfraredLight) {
+  const auto devices = loaded(R"({"name": "camera0", "source": "a.png"},
+                                {"name": "camera1", "source": "b.png", "sees": "infrared"})");
+  ASSERT_TRUE(devices) << devices.message();
+  EXPECT_EQ(devices->cameras[0].sees, Spectrum::visible);
+  EXPECT_EQ(devices->cameras[1].sees, Spectrum::infrared);
+  for (const char* part : {"cameras[0].sees", "visible, infrared", "heat"})
+    expect_contains(problem(R"({"name": "camera0", "source": "a.png", "sees": "heat"})"), part);
+}
+
 }  // namespace
 }  // namespace limn::device

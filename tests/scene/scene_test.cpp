@@ -387,5 +387,68 @@ TEST(Viewer, FileIsAnImagerWithoutDistortion) {
   EXPECT_NE(missing.message().find("fov_deg"), std::string::npos);
 }
 
+// A scene whose slot and prototype balls carry.
+json scene_with_balls() {
+  json scene = whole_scene();
+  scene["prototype"]["markers"] = {{{"name", "constellation:frame.json"}, {"prototype_from_marker", k_pose}}};
+  scene["slots"][0]["marker"] = "constellation:wand.json";
+  scene["slots"][0].erase("size_mm");
+  return scene;
+}
+
+// The folder of such a scene; wand.json and other.json are alike.
+fs::path folder_with_balls(const json& scene) {
+  const fs::path folder = folder_with(scene);
+  json balls = {{"schema", "limn.constellation/1"}, {"name", "wand"}, {"ball_diameter_mm", 40}};
+  balls["balls_mm"] = {{0, 0, 0}, {140, 0, 0}, {60, 80, 20}};
+  EXPECT_TRUE(write_file(folder / "wand.json", balls.dump()));
+  EXPECT_TRUE(write_file(folder / "other.json", balls.dump()));
+  balls["balls_mm"] = {{-205, 135, 20}, {200, 120, 65}, {-215, -30, 75}, {110, -150, 25}, {25, 170, -10}};
+  EXPECT_TRUE(write_file(folder / "frame.json", balls.dump()));
+  return folder;
+}
+
+TEST(Scene, BallsMayCarryThePrototypeAndSlots) {
+  const auto scene = load_scene(folder_with_balls(scene_with_balls()));
+  ASSERT_TRUE(scene) << scene.message();
+  const std::vector<Constellation> balls = constellations(*scene);
+  ASSERT_EQ(balls.size(), 2u);
+  EXPECT_EQ(balls[0].name, "prototype");
+  EXPECT_TRUE(test::near(balls[0].p_balls[0], Eigen::Vector3d(-0.105, 0.335, 0.32), 1e-12));
+  EXPECT_EQ(balls[1].name, "mirror");
+  EXPECT_EQ(balls[1].radius_m, 0.02);
+  EXPECT_TRUE(test::near(balls[1].p_balls[2], Eigen::Vector3d(0.06, 0.08, 0.02), 1e-12));
+  const std::vector<Body> square = bodies(*scene);
+  ASSERT_EQ(square.size(), 1u);
+  EXPECT_EQ(square[0].name, "trim");
+  EXPECT_EQ(first_marker_size_m(*scene), 0.03);
+}
+
+TEST(Scene, MistakesWithBallsAreErrorsWithTheirPath) {
+  const json good = scene_with_balls();
+  const auto expect = [&](const char* place, const json& value, std::vector<std::string> parts) {
+    json scene = good;
+    scene[json::json_pointer(place)] = value;
+    const auto loaded = load_scene(folder_with_balls(scene));
+    ASSERT_FALSE(loaded) << place;
+    for (const std::string& part : parts)
+      EXPECT_NE(loaded.message().find(part), std::string::npos) << part << ": " << loaded.message();
+  };
+  expect("/slots/0/size_mm", 30, {"slots[0].size_mm", "whose file states"});
+  expect("/slots/0/marker", "constellation:none.json", {"slots[0].marker", "none.json"});
+  expect("/slots/0/marker", "constellation:../wand.json", {"slots[0].marker", "inside the file's folder"});
+  expect("/slots/1/marker", "constellation:wand.json", {"slots[1].marker", "slots[0].marker uses"});
+  expect("/prototype/markers/1",
+         {{"name", "aruco_4x4_50:7"}, {"size_mm", 40}, {"prototype_from_marker", k_pose}},
+         {"prototype.markers", "either square markers or one constellation"});
+  expect("/controls/0/marker", "constellation:wand.json", {"controls[0].marker", "square marker"});
+  expect("/slots/1",
+         {{"name", "trim"},
+          {"marker", "constellation:other.json"},
+          {"marker_from_part", k_pose},
+          {"variants", {{{"name", "line"}, {"mesh", "quad.obj"}, {"units", "m"}}}}},
+         {"'mirror' and 'trim'", "expected different ones"});
+}
+
 }  // namespace
 }  // namespace limn::scene

@@ -70,7 +70,7 @@ TEST(Pairing, AMarkerThatLiesIsOfferedUntilItIsTakenAway) {
   const auto see = [&](const Eigen::Vector3d& beside) {
     test::PlacedMarker marker{k_nine, laid};
     marker.camera_from_marker.translation += beside;
-    marker.size_m = loose_size_m(*scene);
+    marker.size_m = scene::first_marker_size_m(*scene);
     now += 1 / 30.0;
     const cv::Mat image = test::image_of(rig.cameras[0].lens, ground, std::span(&marker, 1), {}, rng);
     const Frame frame{"camera0", image, shifted(Stamp{}, now)};

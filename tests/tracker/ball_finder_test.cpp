@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -233,6 +234,91 @@ TEST(BallFinder, RefusesWhatIsNoWholeSphere) {
     ADD_FAILURE() << ball.centre_px.transpose() << " radius " << ball.radius_px;
   EXPECT_TRUE(finder.find({}, lens).empty());
   EXPECT_TRUE(finder.find(test::noise(640, 480, rng), lens).empty());
+}
+
+// Covers everything on one side of a line through the image with one light, up to the line's very place.
+void cover(const Eigen::Vector2d& px_line, double direction, double level, cv::Mat* light) {
+  const Eigen::Vector2d normal(std::cos(direction), std::sin(direction));
+  for (int y = 0; y < light->rows; ++y)
+    for (int x = 0; x < light->cols; ++x) {
+      const double covered = std::clamp(normal.dot(Eigen::Vector2d(x, y) - px_line) + 0.5, 0.0, 1.0);
+      float& at = light->at<float>(y, x);
+      at = static_cast<float>((1 - covered) * at + covered * level);
+    }
+}
+
+// Spheres of 40 px before something of that light that covers a share of their outlines.
+Errors errors_of_covered(double share, double level, std::mt19937_64& rng) {
+  const Lens lens = wide_lens();
+  BallFinder finder;
+  Errors errors;
+  for (int i = 0; i < 30; ++i) {
+    PlacedBall ball = ball_at(lens, {uniform(rng, 200, 1000), uniform(rng, 200, 700)}, 40, BallSurface::matt);
+    ball.d_to_light = Eigen::Vector3d(uniform(rng, -0.5, 0.5), uniform(rng, -0.5, 0.3), -1).normalized();
+    cv::Mat light = test::light_of(lens, test::plain(1280, 960, 40), std::vector{ball});
+    const double direction = uniform(rng, -M_PI, M_PI);
+    // The ends of the covered arc are `share` of a half turn from its middle.
+    const Eigen::Vector2d px = lens.project(ball.p_camera).value();
+    const auto edge = lens.unproject(px + Eigen::Vector2d(1, 0)).value();
+    const double px_per_radian = 1 / std::acos(edge.dot(ball.p_camera.normalized()));
+    const double radius_px = px_per_radian * std::asin(ball.radius_m / ball.p_camera.norm());
+    const Eigen::Vector2d towards(std::cos(direction), std::sin(direction));
+    cover(px + radius_px * std::cos(M_PI * share) * towards, direction, level, &light);
+    cv::GaussianBlur(light, light, {}, 0.6);
+    add(lens, ball, finder.find(test::noisy_grey(light, 2, rng), lens), &errors);
+  }
+  return errors;
+}
+
+TEST(BallFinder, FindsTheCentreOfASphereThatIsCoveredInPart) {
+  auto rng = test::test_rng();
+  for (const double share : {0.1, 0.25, 0.4}) {
+    SCOPED_TRACE(share);
+    const Errors errors = errors_of_covered(share, 15, rng);
+    EXPECT_GE(errors.found, share < 0.2 ? 26 : share < 0.3 ? 16 : 8);
+    EXPECT_EQ(errors.more, 0);
+    EXPECT_LT(errors.rms(), share < 0.2 ? 0.05 : 0.08);
+    EXPECT_LT(errors.mean().norm(), 0.03);
+    EXPECT_GT(errors.deviation_share(), 0.6);
+    EXPECT_LT(errors.deviation_share(), 1.5);
+    EXPECT_LT(std::sqrt(errors.angle_normalised / errors.found), 1.6);
+  }
+  EXPECT_EQ(errors_of_covered(0.6, 15, rng).found, 0);  // too little is left
+}
+
+// The centres are 1.02 diameters apart, so that the threshold makes one region of both, or the nearer covers
+// a part of the other.
+TEST(BallFinder, TouchingSpheresAreBothFound) {
+  auto rng = test::test_rng();
+  const Lens lens = wide_lens();
+  BallFinder finder;
+  for (const double apart : {0.8, 0.9, 1.02}) {
+    SCOPED_TRACE(apart);
+    Errors errors;
+    for (int i = 0; i < 20; ++i) {
+      const Eigen::Vector2d px(uniform(rng, 250, 1000), uniform(rng, 250, 700));
+      const double turn = uniform(rng, -M_PI, M_PI);
+      const PlacedBall one = ball_at(lens, px, 40, BallSurface::matt);
+      PlacedBall other = one;
+      other.p_camera += 2 * apart * one.radius_m * Eigen::Vector3d(std::cos(turn), std::sin(turn), 0);
+      other.p_camera *= 1.03;  // behind it
+      const std::vector<PlacedBall> balls = {one, other};
+      const cv::Mat image =
+          test::image_of(lens, test::plain(1280, 960, 40), balls, {.blur_px = 0.6, .noise_levels = 2}, rng);
+      const std::vector<Ball> found = finder.find(image, lens);
+      EXPECT_LE(found.size(), 2u);
+      for (const PlacedBall& ball : balls) {
+        const Eigen::Vector2d at = lens.project(ball.p_camera).value();
+        std::vector<Ball> near;
+        std::ranges::copy_if(found, std::back_inserter(near),
+                             [&](const Ball& f) { return (f.centre_px - at).norm() < 2; });
+        add(lens, ball, near, &errors);
+      }
+    }
+    EXPECT_GE(errors.found, 34);
+    EXPECT_LT(errors.rms(), 0.1);
+    EXPECT_LT(errors.deviation_share(), 1.6);
+  }
 }
 
 }  // namespace

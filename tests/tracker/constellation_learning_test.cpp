@@ -6,7 +6,7 @@
 #include "tests/support/random.h"
 #include "tests/tracker/seen_balls.h"
 #include "tests/tracker/seen_body.h"
-#include "tracker/balls/three_point_pose.h"
+#include "core/linear_algebra.h"
 
 namespace limn::tracker {
 namespace {

@@ -1,4 +1,4 @@
-#include "tracker/balls/constellation.h"
+#include "core/constellation.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace {
 std::string problem_of(const std::vector<Eigen::Vector3d>& p_mm, double radius_mm = 20) {
   Constellation constellation{"wand", 1e-3 * radius_mm, {}};
   for (const Eigen::Vector3d& p : p_mm) constellation.p_balls.push_back(1e-3 * p);
-  const Status status = check(constellation);
+  const Status status = check_constellation(constellation);
   return status ? "" : status.message();
 }
 
@@ -23,7 +23,7 @@ bool has(const std::string& text, const std::string& part) { return text.find(pa
 TEST(Constellation, DifferentOnesAreAccepted) {
   const std::vector<Constellation> all = {test::triangle(), test::other_triangle(), test::five_balls()};
   for (const Constellation& one : all) {
-    const Status status = check(one);
+    const Status status = check_constellation(one);
     EXPECT_TRUE(status) << status.message();
   }
   const Status status = check_distinct(all);

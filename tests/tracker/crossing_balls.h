@@ -25,7 +25,7 @@ inline Crossings crossings(int frames, std::mt19937_64& rng) {
   const Imager camera = camera_1080p();
   const HandMotion hand(Pose(Eigen::Quaterniond::Identity(), {0, 0, 1.6}), rng);
   const HandMotion other_hand(Pose(exp_rotation({0, 0, 0.4}), {0.05, 0.02, 1.65}), rng);
-  const std::vector<tracker::Constellation> constellations = {triangle(), other_triangle()};
+  const std::vector<Constellation> constellations = {triangle(), other_triangle()};
   Crossings count;
   std::vector<tracker::BodyFilter> known;
   const Stamp start = Stamp{} + std::chrono::seconds(1);

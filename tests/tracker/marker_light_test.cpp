@@ -79,5 +79,52 @@ TEST(MarkerMask, LightsSparesOrLeavesTheImage) {
   EXPECT_EQ(with_marker_light(image, mask, MarkerLight::keep_out).at<cv::Vec3b>(1, 1), cv::Vec3b(10, 20, 30));
 }
 
+// Five balls in front of the projector.
+Constellation five_balls() {
+  return {
+      "five",
+      0.02,
+      {{-0.08, -0.06, 0}, {0.1, -0.05, 0.02}, {-0.02, 0.09, -0.01}, {0.05, 0.03, 0.08}, {-0.07, 0.02, 0.06}}};
+}
+
+TEST(BallMask, CoversExactlyTheSpheresThroughTheProjectorsLens) {
+  const Constellation balls = five_balls();
+  const Imager imager = projector();
+  Track track;
+  track.body = "five";
+  track.world_from_body = Pose(exp_rotation({0.2, -0.1, 0.4}), {0.02, 0.01, 1});
+  const cv::Mat mask = ball_mask(imager, std::span(&balls, 1), std::span(&track, 1), {.margin = 0.25});
+  int wrong = 0, on = 0;
+  for (int row = 0; row < mask.rows; row += 2)
+    for (int column = 0; column < mask.cols; column += 2) {
+      const Ray ray = imager.ray({column, row}).value();
+      double beside = 1;  // distance of the ray from the nearest widened sphere
+      for (const Eigen::Vector3d& p : balls.p_balls)
+        beside = std::min(beside, ray.d.cross(track.world_from_body * p - ray.p_origin).norm() - 1.5 * 0.02);
+      const bool lit = mask.at<std::uint8_t>(row, column) == 255;
+      on += lit;
+      wrong += lit != (beside < 0) && std::abs(beside) > 1_mm;  // a projector pixel is 0.6 mm
+    }
+  EXPECT_GT(on, 1000);
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(BallMask, WhatOnlyInfraredCamerasSeeIsNotKeptDark) {
+  const Constellation balls = five_balls();
+  const Body body = test::body_of(1);
+  std::vector<Track> tracks = {track_of(body, Pose(Eigen::Quaterniond::Identity(), {0, 0, 1}))};
+  tracks.push_back(tracks[0]);
+  tracks[1].body = "five";
+  Imager beside = projector(), camera = projector();
+  camera.sees = Spectrum::infrared;
+  beside.imager_from_world.translation.x() += 3;  // sees neither
+  const auto seen = [&](std::vector<Imager> cameras) {
+    return seen_in_visible_light(cameras, std::span(&body, 1), std::span(&balls, 1), tracks).size();
+  };
+  EXPECT_EQ(seen({projector(), camera}), 2u);
+  EXPECT_EQ(seen({camera}), 0u);
+  EXPECT_EQ(seen({camera, beside}), 0u);
+}
+
 }  // namespace
 }  // namespace limn::tracker

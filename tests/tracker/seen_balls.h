@@ -5,21 +5,21 @@
 #include <random>
 #include <vector>
 
+#include "core/constellation.h"
 #include "core/imager.h"
 #include "tests/tracker/ball_images.h"
 #include "tracker/balls/ball.h"
-#include "tracker/balls/constellation.h"
 
 namespace limn::test {
 
 /// Constellations of balls of 40 mm: two triangles, and one of five.
-inline tracker::Constellation triangle() {
+inline Constellation triangle() {
   return {"triangle", 0.02, {{-0.09, -0.05, 0}, {0.11, -0.05, 0}, {-0.01, 0.08, 0}}};
 }
-inline tracker::Constellation other_triangle() {
+inline Constellation other_triangle() {
   return {"other", 0.02, {{-0.07, -0.04, 0}, {0.10, -0.04, 0}, {-0.04, 0.085, 0}}};
 }
-inline tracker::Constellation five_balls() {
+inline Constellation five_balls() {
   return {
       "five",
       0.02,
@@ -28,7 +28,7 @@ inline tracker::Constellation five_balls() {
 
 /// A constellation and where it is.
 struct PlacedConstellation {
-  tracker::Constellation constellation;
+  Constellation constellation;
   Pose world_from_body;
 };
 

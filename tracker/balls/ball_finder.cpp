@@ -16,6 +16,13 @@ constexpr double k_most_elongation = 3;  // the box's; a sphere 70 degrees off t
 // Boundaries run along pixels, which is an error of .3 px; shade on the sphere moves them, too.
 constexpr double k_most_rms_px = 0.5, k_most_rms_share = 0.03;
 
+// A boundary that may show parts of outlines: least share of its box, least area (of a square around the
+// smallest sphere) and largest size (in largest spheres).
+constexpr double k_least_part_fill = 0.3, k_least_part = 0.4, k_most_part = 3;
+// Least area over the squared number of cracks along the boundary: .049 for a circle, .012 for four in a row.
+constexpr double k_least_compactness = 0.011;
+constexpr double k_beside_px = 5;  // what lies this close beside an outline disturbs its fit
+
 bool is_round(const Contours::Extent& extent, const Contours::Box& box, const BallFinderOptions& options) {
   const double longer = std::max(box.width, box.height), shorter = std::min(box.width, box.height);
   const double fill = extent.area / (box.width * box.height);
@@ -62,6 +69,39 @@ std::optional<BallOutline> BallFinder::outline(const Contours::Extent& extent, c
   return BallOutline{*centre, radius_px};
 }
 
+// Outlines that the boundary shows in part. They are nearly circles in a plane in which a step to any side is
+// the same angle.
+std::vector<BallOutline> BallFinder::partial_outlines(const Contours::Extent& extent, const Lens& lens) {
+  const Contours::Box box = contours_.box();
+  const auto cracks = static_cast<double>(extent.count);
+  if (!(extent.area > k_least_part_fill * box.width * box.height) ||
+      !(extent.area > k_least_compactness * cracks * cracks) ||
+      !(extent.area > k_least_part * options_.min_diameter_px * options_.min_diameter_px) ||
+      !(std::max(box.width, box.height) < k_most_part * options_.max_diameter_px))
+    return {};
+  contours_.find_corners(cracks, 2);  // the points are readable after this
+  const std::size_t count = contours_.size(), used = std::min(count, k_most_points);
+  const Eigen::Vector2d middle = 0.5 * (contours_.point(0) + contours_.point(count / 2));
+  const auto d_middle = lens.unproject(middle);
+  Eigen::Vector2d px;
+  PixelByPoint by_d;
+  if (!d_middle || !lens.model.project(lens.values, *d_middle, &px, by_d.data())) return {};
+  // by_d leaves out the direction of d itself, so this is the sum over any two tangents.
+  const Eigen::Matrix2d px2_by_angle2 = by_d * by_d.transpose();
+  const double scale = std::sqrt(std::sqrt(px2_by_angle2.determinant()));
+  const Eigen::Matrix2d flat_by_px =
+      scale * Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(px2_by_angle2).operatorInverseSqrt();
+  if (!flat_by_px.allFinite()) return {};
+  flat_.clear();
+  for (std::size_t i = 0; i < used; ++i)
+    flat_.push_back(flat_by_px * (contours_.point(i * count / used) - middle));
+  std::vector<BallOutline> outlines;
+  for (const CircleArcs& circle :
+       circles_along(flat_, 0.5 * options_.min_diameter_px, 0.5 * options_.max_diameter_px, k_beside_px))
+    outlines.push_back({middle + flat_by_px.inverse() * circle.centre, circle.radius, circle.parts});
+  return outlines;
+}
+
 void BallFinder::find_in(const cv::Mat& dark_balls,
                          const cv::Mat& grey,
                          const Lens& lens,
@@ -70,20 +110,26 @@ void BallFinder::find_in(const cv::Mat& dark_balls,
   threshold_.apply(dark_balls, {.min_contrast = options_.min_contrast, .above_noise = true}, corners_, alone);
   const bool is_dark = dark_balls.data == grey.data;
   contours_.for_each(corners_, [&](const Contours::Extent& extent) {
-    const auto start = outline(extent, lens);
-    if (!start) return;
-    const auto ball = fitter_.fit(grey, lens, *start, options_.min_contrast);
-    if (!ball || (ball->contrast < 0) != is_dark) return;
-    const double diameter_px = 2 * ball->radius_px;
-    if (diameter_px < options_.min_diameter_px || diameter_px > options_.max_diameter_px) return;
-    const auto same = std::find_if(balls->begin(), balls->end(), [&](const Ball& other) {
-      return (other.centre_px - ball->centre_px).norm() < std::max(other.radius_px, ball->radius_px);
-    });
-    if (same == balls->end())
-      balls->push_back(*ball);
-    else if (std::abs(same->contrast) < std::abs(ball->contrast))
-      *same = *ball;
+    if (const auto whole = outline(extent, lens))
+      add(*whole, is_dark, grey, lens, balls);
+    else
+      for (const BallOutline& part : partial_outlines(extent, lens)) add(part, is_dark, grey, lens, balls);
   });
+}
+
+void BallFinder::add(
+    const BallOutline& start, bool is_dark, const cv::Mat& grey, const Lens& lens, std::vector<Ball>* balls) {
+  const auto ball = fitter_.fit(grey, lens, start, options_.min_contrast);
+  if (!ball || (ball->contrast < 0) != is_dark) return;
+  const double diameter_px = 2 * ball->radius_px;
+  if (diameter_px < options_.min_diameter_px || diameter_px > options_.max_diameter_px) return;
+  const auto same = std::find_if(balls->begin(), balls->end(), [&](const Ball& other) {
+    return (other.centre_px - ball->centre_px).norm() < std::max(other.radius_px, ball->radius_px);
+  });
+  if (same == balls->end())
+    balls->push_back(*ball);
+  else if (std::abs(same->contrast) < std::abs(ball->contrast))
+    *same = *ball;
 }
 
 std::vector<Ball> BallFinder::find(const cv::Mat& grey, const Lens& lens) {

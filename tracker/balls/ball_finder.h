@@ -31,8 +31,9 @@ struct BallFinderOptions {
 };
 
 /// Finds plain spheres: local threshold -> boundaries -> those whose rays form a cone -> fit of the shaded
-/// sphere. Each is found once. A sphere that something else covers in part is not found. Holds its buffers,
-/// so use one for each thread.
+/// sphere. Where a boundary is no cone, arcs of it that lie on cones start fits of what is not hidden: of
+/// spheres that something covers up to two fifths of the outline, and of spheres that touch in the image.
+/// Each is found once. Holds its buffers, so use one for each thread.
 class BallFinder {
  public:
   explicit BallFinder(BallFinderOptions options = {});
@@ -48,10 +49,17 @@ class BallFinder {
   Contours contours_;
   BallFitter fitter_;
   cv::Mat inverted_;
-  std::vector<Eigen::Vector3d> d_;  // directions of a boundary's points
+  std::vector<Eigen::Vector2d> flat_;  // a boundary's points in a plane in which outlines are circles
+  std::vector<Eigen::Vector3d> d_;     // directions of a boundary's points
 
   void find_in(const cv::Mat& dark_balls, const cv::Mat& grey, const Lens& lens, std::vector<Ball>* balls);
   std::optional<BallOutline> outline(const Contours::Extent& extent, const Lens& lens);
+  std::vector<BallOutline> partial_outlines(const Contours::Extent& extent, const Lens& lens);
+  void add(const BallOutline& start,
+           bool is_dark,
+           const cv::Mat& grey,
+           const Lens& lens,
+           std::vector<Ball>* balls);
 };
 
 }  // namespace limn::tracker

@@ -37,7 +37,8 @@ constexpr double k_settled_px = 1e-3, k_roughly_settled_px = 0.02;  // rough: be
 constexpr double k_huber = 2;                                       // in robust standard deviations
 constexpr int k_rounds = 3;                // the blur of each round sets the reach of the next
 constexpr double k_same_blur_share = 0.1;  // a blur that changes by less needs no further round
-constexpr int k_sectors = 16;
+constexpr std::size_t k_sectors = k_outline_parts / 2;
+constexpr std::size_t k_least_sectors = 7;  // that must be shown, of these 16
 constexpr double k_alike_by_chance = 2;  // variance of the sectors' sums over that of independent residuals
 // The outline may deviate from a cone by this much (RMS over its sectors, beyond noise), as share of its
 // radius.
@@ -46,6 +47,13 @@ constexpr double k_most_residual_share = 0.08;  // RMS residual over the contras
 constexpr double k_noise_levels = 3;
 constexpr double k_least_sector_share = 0.15;  // contrast of the weaker sectors, as share of the mean
 constexpr int k_most_weak_sectors = 3;
+constexpr double k_partial_share = 0.4;   // these limits for an outline that is shown in part
+constexpr double k_partial_variance = 2;  // an arc shows less of what disturbs it
+constexpr double k_least_disturbed = 4;   // levels
+constexpr int k_most_fits = 3;            // each leaves out the parts that disturbed the one before
+constexpr std::size_t k_least_kept = 17;  // parts; fewer suit what is no sphere, too
+constexpr int k_most_gaps = 2;            // what hides a part leaves one gap; what is no sphere has more
+constexpr double k_most_disturbed = 2.5;  // a part's residual over the median of all parts
 constexpr double k_most_stddev_px = 0.3;
 // The radius is known to this at best: pixels and blur are not quite Gaussian.
 constexpr double k_systematic_radius_px = 0.03;
@@ -183,7 +191,7 @@ struct Model {
   Row by_terms;
   double inside_px = 0;
   double by_edge = 0;  // derivative by a shift of the edge outwards
-  int sector = 0;
+  std::size_t sector = 0;
 };
 
 template <class Pixel, class State>
@@ -217,8 +225,7 @@ Model model_of(const Pixel& pixel, const State& state) {
   model.by_terms << model.by_edge * place.by_centre, model.by_edge * place.by_radius, by_sigma,
       (1 - covered) * Eigen::Vector3d(1, place.cos_phi, place.sin_phi),
       covered * Eigen::Vector3d(1, place.cos_phi, place.sin_phi), covered * cos_2, covered * sin_2, limb;
-  const double turn = std::atan2(place.sin_phi, place.cos_phi) / (2 * std::numbers::pi) + 0.5;
-  model.sector = std::min(k_sectors - 1, static_cast<int>(turn * k_sectors));
+  model.sector = outline_part({place.cos_phi, place.sin_phi}) / 2;
   return model;
 }
 
@@ -298,7 +305,10 @@ BallFitter::BallFitter(Encoding encoding) : encoding_(encoding) {}
 
 // Collects the pixels on both sides of the outline. False when a part of it lies outside the image or has no
 // direction.
-bool BallFitter::collect(const cv::Mat& grey, const Lens& lens, const State& state) {
+bool BallFitter::collect(const cv::Mat& grey,
+                         const Lens& lens,
+                         const State& state,
+                         const OutlineParts& shown) {
   const double reach = k_reach_blurs * state.blur_px + k_reach_px;
   const double reach_inside = std::min(reach, k_most_inside_share * state.radius_px);
   const Eigen::Matrix2d angles_by_px = state.px_by_angles.inverse();
@@ -320,6 +330,7 @@ bool BallFitter::collect(const cv::Mat& grey, const Lens& lens, const State& sta
       const double angle = (angles_by_px * (px - state.centre_px)).norm();
       const double roughly = state.radius_px * (1 - angle / state.half_angle());
       if (roughly > reach_inside + 1 || roughly < -reach - 1 || number++ % every != 0) continue;
+      if (!shown[outline_part(px - state.centre_px)]) continue;
       Pixel pixel;
       pixel.px = px;
       const auto d = lens.unproject(px);
@@ -340,15 +351,20 @@ namespace {
 // Shifts of the edge in each sector of the outline, which a sphere does not have, and what else tells a
 // sphere.
 struct Evidence {
-  double bumps_px = 0;   // RMS shift beyond noise
-  double agreement = 1;  // variance of the shifts over what independent pixels would give
-  double contrast = 0;   // mean over the sectors
-  int weak_sectors = 0;  // without an edge
-  double residual = 0;   // RMS
+  double bumps_px = 0;      // RMS shift beyond noise
+  double agreement = 1;     // variance of the shifts over what independent pixels would give
+  double contrast = 0;      // mean over the sectors
+  int weak_sectors = 0;     // without an edge
+  std::size_t sectors = 0;  // that are shown
+  double residual = 0;      // RMS
 };
 
 template <class Pixels, class State>
-Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& loss, double scale) {
+Evidence evidence_of(const Pixels& pixels,
+                     const State& state,
+                     const OutlineParts& shown,
+                     const HuberLoss& loss,
+                     double scale) {
   struct Sector {
     double moment = 0, weight = 0, inside = 0, outside = 0, of_inside = 0, of_outside = 0;
     std::array<double, 2> residuals{}, count{};  // sums over the pixels inside and outside
@@ -359,7 +375,7 @@ Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& 
     const Model model = model_of(pixel, state);
     const double r = pixel.light - model.value, w = loss.weight(r * r / (scale * scale));
     squares += w * r * r;
-    Sector& sector = sectors[static_cast<std::size_t>(model.sector)];
+    Sector& sector = sectors[model.sector];
     const std::size_t side = model.inside_px > 0 ? 0 : 1;
     sector.residuals[side] += w * r, sector.count[side] += w * w;
     sector.moment += w * r * model.by_edge;
@@ -369,20 +385,24 @@ Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& 
   }
   Evidence evidence;
   evidence.residual = std::sqrt(squares / static_cast<double>(pixels.size()));
+  const auto is_shown = [&](std::size_t sector) { return shown[2 * sector] && shown[2 * sector + 1]; };
   std::array<double, k_sectors> contrasts{};
+  for (std::size_t i = 0; i < k_sectors; ++i) evidence.sectors += is_shown(i);
   double shifts = 0, noise = 0, normalised = 0, used = 0;
   for (std::size_t i = 0; i < sectors.size(); ++i) {
     const Sector& sector = sectors[i];
     if (sector.of_inside > 0 && sector.of_outside > 0)
       contrasts[i] = sector.inside / sector.of_inside - sector.outside / sector.of_outside;
-    evidence.contrast += contrasts[i] / k_sectors;
+    if (is_shown(i)) evidence.contrast += contrasts[i] / static_cast<double>(evidence.sectors);
     if (!(sector.weight > 0)) continue;
     const double shift = sector.moment / sector.weight, variance = scale * scale / sector.weight;
     if (variance > 0.25) continue;  // no edge there
     shifts += shift * shift, noise += variance, normalised += shift * shift / variance, used += 1;
   }
-  for (const double contrast : contrasts)
-    if (!(contrast * evidence.contrast > k_least_sector_share * evidence.contrast * evidence.contrast))
+  for (std::size_t i = 0; i < k_sectors; ++i)
+    if (const double contrast = contrasts[i];
+        is_shown(i) &&
+        !(contrast * evidence.contrast > k_least_sector_share * evidence.contrast * evidence.contrast))
       ++evidence.weak_sectors;
   if (used > 0) evidence.bumps_px = std::sqrt(std::max(0.0, (shifts - noise) / used));
   if (used > 0) evidence.agreement = std::max(1.0, normalised / used);
@@ -398,11 +418,43 @@ Evidence evidence_of(const Pixels& pixels, const State& state, const HuberLoss& 
   return evidence;
 }
 
+// Without the parts whose residuals are much larger than most: something lies beside the outline there.
+template <class Pixels, class State>
+OutlineParts undisturbed(const Pixels& pixels, const State& state, const OutlineParts& shown) {
+  std::array<double, k_outline_parts> squares{}, count{};
+  for (const auto& pixel : pixels) {
+    const std::size_t part = outline_part(pixel.px - state.centre_px);
+    const double r = pixel.light - model_of(pixel, state).value;
+    squares[part] += r * r, ++count[part];
+  }
+  std::vector<double> sizes;
+  for (std::size_t i = 0; i < k_outline_parts; ++i)
+    if (shown[i] && count[i] > 0) sizes.push_back(std::sqrt(squares[i] / count[i]));
+  if (sizes.empty()) return shown;
+  const double most = std::max(k_least_disturbed, k_most_disturbed * median(std::move(sizes)));
+  OutlineParts kept = shown;
+  for (std::size_t i = 0; i < k_outline_parts; ++i)
+    if (count[i] > 0 && std::sqrt(squares[i] / count[i]) > most) kept.reset(i);
+  return kept;
+}
+
+// How many runs of parts are left out.
+int gaps_in(const OutlineParts& shown) {
+  int gaps = 0;
+  for (std::size_t i = 0; i < k_outline_parts; ++i)
+    gaps += !shown[i] && shown[(i + k_outline_parts - 1) % k_outline_parts];
+  return gaps;
+}
+
 bool shows_sphere(const Evidence& evidence, double radius_px, double min_contrast) {
   const double contrast = std::abs(evidence.contrast);
-  return contrast >= min_contrast && evidence.weak_sectors <= k_most_weak_sectors &&
-         evidence.bumps_px <= k_most_bumps_px + k_most_bumps_share * radius_px &&
-         evidence.residual <= k_noise_levels + k_most_residual_share * contrast;
+  // An arc suits a sphere more easily than a whole outline does, so it must suit it better.
+  const double strictness = evidence.sectors == k_sectors ? 1 : k_partial_share;
+  return evidence.sectors >= k_least_sectors && contrast >= min_contrast &&
+         evidence.weak_sectors * static_cast<int>(k_sectors) <=
+             k_most_weak_sectors * static_cast<int>(evidence.sectors) &&
+         evidence.bumps_px <= strictness * (k_most_bumps_px + k_most_bumps_share * radius_px) &&
+         evidence.residual <= k_noise_levels + strictness * k_most_residual_share * contrast;
 }
 
 }  // namespace
@@ -411,6 +463,23 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
                                     const Lens& lens,
                                     const BallOutline& start,
                                     double min_contrast) {
+  std::optional<Ball> ball;
+  BallOutline outline = start;
+  for (int i = 0; i < k_most_fits; ++i) {
+    OutlineParts kept = outline.shown;
+    const auto better = fit_shown(grey, lens, outline, min_contrast, &kept);
+    if (better) ball = better;
+    if (kept == outline.shown || kept.count() < k_least_kept || gaps_in(kept) > k_most_gaps) break;
+    outline.shown = kept;
+  }
+  return ball;
+}
+
+std::optional<Ball> BallFitter::fit_shown(const cv::Mat& grey,
+                                          const Lens& lens,
+                                          const BallOutline& start,
+                                          double min_contrast,
+                                          OutlineParts* undisturbed_parts) {
   State state{.centre_px = start.centre_px, .radius_px = start.radius_px, .blur_px = k_first_blur_px};
   if (!start.centre_px.allFinite() || !(start.radius_px > k_smallest_radius_px) || !state.settle(lens))
     return std::nullopt;
@@ -419,7 +488,7 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
   double scale = 1;
   const HuberLoss loss{k_huber};
   for (int round = 0; round < k_rounds; ++round) {
-    if (!collect(grey, lens, state)) return std::nullopt;
+    if (!collect(grey, lens, state, start.shown)) return std::nullopt;
     Problem problem{.lens = lens, .pixels = pixels_, .loss = {0}, .state = state};
     if (!problem.fit_light()) return std::nullopt;
     if (round > 0) {
@@ -438,9 +507,11 @@ std::optional<Ball> BallFitter::fit(const cv::Mat& grey,
       return std::nullopt;
     if (round > 0 && std::abs(state.blur_px - blur_before) < k_same_blur_share * state.blur_px) break;
   }
-  const Evidence evidence = evidence_of(pixels_, state, loss, scale);
+  *undisturbed_parts = undisturbed(pixels_, state, start.shown);
+  const Evidence evidence = evidence_of(pixels_, state, start.shown, loss, scale);
   if (!shows_sphere(evidence, state.radius_px, min_contrast)) return std::nullopt;
-  const Normal covariance = evidence.agreement * information.ldlt().solve(Normal::Identity());
+  const double doubt = evidence.sectors == k_sectors ? 1 : k_partial_variance;
+  const Normal covariance = doubt * evidence.agreement * information.ldlt().solve(Normal::Identity());
   const Eigen::Matrix2d centre = covariance.topLeftCorner<2, 2>();
   if (!centre.allFinite() || !(centre.trace() < 2 * k_most_stddev_px * k_most_stddev_px) ||
       !(centre.determinant() > 0) || !(covariance(2, 2) > 0))

@@ -7,6 +7,7 @@
 
 #include "core/lens.h"
 #include "tracker/balls/ball.h"
+#include "tracker/balls/ball_arcs.h"
 #include "tracker/refine.h"
 
 namespace limn::tracker {
@@ -15,6 +16,7 @@ namespace limn::tracker {
 struct BallOutline {
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();  ///< pixel of the sphere's centre
   double radius_px = 0;
+  OutlineParts shown = OutlineParts().set();  ///< nothing hides these, and nothing else lies beside them
 };
 
 /// Fits the image of a shaded sphere to the pixels around its outline: background outside; inside, light that
@@ -26,8 +28,10 @@ class BallFitter {
   /// As for EdgeRefiner: positions are computed in linear light.
   explicit BallFitter(Encoding encoding = Encoding::linear);
 
-  /// nullopt when the pixels do not show a sphere's outline of at least `min_contrast` (of 255) near `start`:
-  /// the outline is not a cone, it has no edge on much of its length, or it leaves the image.
+  /// Only the pixels at the outline's shown parts are used; they must be at least 7 sixteenths of it, and
+  /// those that something beside the outline disturbs are left out, too. nullopt when the pixels do not show
+  /// a sphere's outline of at least `min_contrast` (of 255) near `start`: the outline is not a cone, it has
+  /// no edge on much of its length, or it leaves the image.
   std::optional<Ball> fit(const cv::Mat& grey,
                           const Lens& lens,
                           const BallOutline& start,
@@ -45,7 +49,13 @@ class BallFitter {
   EdgeRefiner encoding_;  // for its table of light
   std::vector<Pixel> pixels_;
 
-  bool collect(const cv::Mat& grey, const Lens& lens, const State& state);
+  // Fits the shown parts; says which of them nothing disturbs.
+  std::optional<Ball> fit_shown(const cv::Mat& grey,
+                                const Lens& lens,
+                                const BallOutline& start,
+                                double min_contrast,
+                                OutlineParts* undisturbed_parts);
+  bool collect(const cv::Mat& grey, const Lens& lens, const State& state, const OutlineParts& shown);
 };
 
 }  // namespace limn::tracker

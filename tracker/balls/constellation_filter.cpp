@@ -1,7 +1,12 @@
 #include "tracker/balls/constellation_filter.h"
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <optional>
+
+#include "tracker/balls/three_point_pose.h"
+#include "tracker/triangle_pose.h"
 
 namespace limn::tracker {
 namespace {
@@ -9,15 +14,22 @@ namespace {
 // Three balls in one camera are reported when this many images agree: those of two bodies that move do not
 // stay as far apart.
 constexpr int k_images_to_confirm = 10;
+// So many suffice where the same balls were reported a moment before: they are found only where they are
+// expected.
+constexpr int k_images_to_confirm_again = 2;
 // How far a body may be from where its motion leads to: a part for the prediction's error, and one for what a
 // hand does while the body is not seen.
 constexpr double k_spread_m = 0.01, k_spread_m_per_s = 0.6, k_spread_turn = 0.05, k_spread_turn_per_s = 3;
+// For so long the filter's motion still leads to the right place: the spread grows with the square of the
+// time.
+constexpr double k_predicted_s = 0.15;
 
 ExpectedPoses expected_of(const BodyFilter* known, Stamp at, const MotionModel& model) {
   if (!known) return {};
   const double unseen = std::max(0.0, seconds_between(known->measured_at, at));
-  return {expected_poses(*known, at, model), k_spread_m + k_spread_m_per_s * unseen,
-          k_spread_turn + k_spread_turn_per_s * unseen};
+  const double unforeseen = unseen * std::min(1.0, unseen / k_predicted_s);
+  return {expected_poses(*known, at, model), k_spread_m + k_spread_m_per_s * unforeseen,
+          k_spread_turn + k_spread_turn_per_s * unforeseen};
 }
 
 // After a step: a body that has just been found among three balls, or again after a while, must be confirmed;
@@ -28,8 +40,9 @@ int images_to_confirm(const BodyFilter* before,
                       std::span<const ConstellationFit> fits) {
   if (before && after.measured_at == before->measured_at) return before->images_to_confirm;
   if (!is_weak(fits.front())) return 0;
-  const bool is_new = !before || after.fixes.size() == 1 || !is_firm(expected);
-  return is_new ? k_images_to_confirm : std::max(0, before->images_to_confirm - 1);
+  if (!before || after.fixes.size() == 1) return k_images_to_confirm;
+  if (is_firm(expected)) return std::max(0, before->images_to_confirm - 1);
+  return before->images_to_confirm > 0 ? k_images_to_confirm : k_images_to_confirm_again;
 }
 
 // The explanations of one constellation as evidence for its pose. A minimum's chi-square includes the sizes
@@ -84,13 +97,42 @@ class BallEvidence : public BodyEvidence {
   std::span<const ConstellationFit> fits_;
 };
 
+// The pose of three balls by the paper's triangle: the balls' places in the camera's frame are where the rays
+// of their centres come nearest to the balls of the pose that the image suits.
+std::optional<Pose> triangle_fix(const Constellation& constellation,
+                                 std::span<const BallView> views,
+                                 std::span<const ConstellationFit> fits,
+                                 const Pose& world_from_body) {
+  const auto nearest = std::ranges::min_element(fits, {}, [&](const ConstellationFit& fit) {
+    return angle_between(fit.fit.world_from_body.rotation, world_from_body.rotation);
+  });
+  if (constellation.p_balls.size() != 3 || !is_weak(*nearest)) return std::nullopt;
+  const BallView& view = views[nearest->matches.front().view];
+  std::array<Eigen::Vector3d, 3> p_body, d_camera;
+  for (std::size_t i = 0; i < 3; ++i) {
+    p_body[i] = constellation.p_balls[nearest->matches[i].in_constellation];
+    d_camera[i] = view.balls[nearest->matches[i].ball].d_centre;
+  }
+  const Pose camera_from_body = view.camera->imager_from_world * nearest->fit.world_from_body;
+  const std::vector<Pose> poses = three_point_poses(p_body, d_camera);
+  if (poses.empty()) return std::nullopt;
+  const Pose solution = *std::ranges::min_element(
+      poses, {}, [&](const Pose& pose) { return angle_between(pose.rotation, camera_from_body.rotation); });
+  Triangle in_camera;
+  for (std::size_t i = 0; i < 3; ++i) in_camera[i] = (solution * p_body[i]).dot(d_camera[i]) * d_camera[i];
+  const auto camera_from_triangle = pose_from_triangles(p_body, in_camera);
+  if (!camera_from_triangle) return std::nullopt;
+  return view.camera->imager_from_world.inverse() * *camera_from_triangle;
+}
+
 }  // namespace
 
 std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
                                  std::span<const Constellation> constellations,
                                  std::span<const BallView> views,
                                  Stamp captured_at,
-                                 const MotionModel& model) {
+                                 const MotionModel& model,
+                                 TriplePose triple_pose) {
   std::vector<const BodyFilter*> before;
   std::vector<ExpectedPoses> expected;
   for (const Constellation& constellation : constellations) {
@@ -105,6 +147,11 @@ std::vector<BodyFilter> observed(std::span<const BodyFilter> known,
     auto after = advanced(before[i], constellations[i].name, seen, captured_at, model);
     if (!after) continue;
     after->images_to_confirm = images_to_confirm(before[i], *after, expected[i], fits[i]);
+    if (triple_pose == TriplePose::triangle && after->measured_at == captured_at && !fits[i].empty()) {
+      Fix& fix = after->fixes.back();
+      fix.world_from_body =
+          triangle_fix(constellations[i], views, fits[i], fix.world_from_body).value_or(fix.world_from_body);
+    }
     motions.push_back(std::move(*after));
   }
   return motions;

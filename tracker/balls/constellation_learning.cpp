@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "core/least_squares.h"
-#include "tracker/balls/three_point_pose.h"
+#include "core/linear_algebra.h"
 #include "tracker/body_correspondences.h"
 
 namespace limn::tracker {
@@ -389,7 +389,7 @@ Result<LearnedConstellation> learn_constellation(std::span<const BallView> views
   }
   LIMN_TRY(LearnedConstellation learned, result_of(&adjustment, chi_square, name));
   learned.dropped_balls = dropped;
-  LIMN_TRY_STATUS(check(learned.constellation));
+  LIMN_TRY_STATUS(check_constellation(learned.constellation));
   return learned;
 }
 

@@ -26,8 +26,8 @@ struct LearnedConstellation {
 /// an image of a different moment. The image with most balls must show all of them. Distances from the
 /// camera, which the balls' angular sizes give, start a bundle adjustment of the body's poses and the balls'
 /// places on centres and sizes, in turn with the identification of the balls in each image. The scale is that
-/// of `radius_m`. Error: fewer than three images agree, the places are not determined, or check() refuses the
-/// constellation.
+/// of `radius_m`. Error: fewer than three images agree, the places are not determined, or
+/// check_constellation() refuses the constellation.
 Result<LearnedConstellation> learn_constellation(std::span<const BallView> views,
                                                  double radius_m,
                                                  const std::string& name);

@@ -409,4 +409,25 @@ std::vector<std::vector<ConstellationFit>> identified(std::span<const Constellat
   return result;
 }
 
+std::vector<Track> observed(std::span<const Constellation> constellations,
+                            std::span<const BallView> views,
+                            Stamp captured_at) {
+  constexpr double k_sure = 0.95;
+  const auto found = identified(constellations, views);
+  std::vector<Track> tracks;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (found[i].empty() || found[i].front().weight < k_sure) continue;
+    const ConstellationFit& fit = found[i].front();
+    Track track;
+    track.body = constellations[i].name;
+    track.world_from_body = fit.fit.world_from_body;
+    track.covariance = fit.fit.covariance;
+    track.captured_at = captured_at;
+    track.marker_count = static_cast<int>(fit.matches.size());
+    track.rms_px = fit.fit.rms_px;
+    tracks.push_back(std::move(track));
+  }
+  return tracks;
+}
+
 }  // namespace limn::tracker

@@ -3,9 +3,11 @@
 #include <span>
 #include <vector>
 
+#include "core/constellation.h"
+#include "core/frame.h"
 #include "core/imager.h"
+#include "core/track.h"
 #include "tracker/balls/ball.h"
-#include "tracker/balls/constellation.h"
 #include "tracker/pose_fit.h"
 
 namespace limn::tracker {
@@ -54,6 +56,12 @@ double size_cost(std::span<const BallMatch> matches,
                  const Constellation& constellation,
                  std::span<const BallView> views,
                  const Pose& world_from_body);
+
+/// The poses of constellations from one moment's images, without history. One whose balls suit several poses,
+/// of which none is far likelier than the others, is absent: only later images tell which is right.
+std::vector<Track> observed(std::span<const Constellation> constellations,
+                            std::span<const BallView> views,
+                            Stamp captured_at);
 
 /// Finds each constellation in the images of one moment: the result has, for each constellation, its
 /// explanations, likeliest first; none where balls_needed() balls are not seen, or do not lie as it does.

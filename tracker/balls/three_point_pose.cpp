@@ -71,16 +71,6 @@ std::array<double, 5> polynomial(const Triangle& t) {
 
 }  // namespace
 
-Pose aligned(std::span<const Eigen::Vector3d> p_a, std::span<const Eigen::Vector3d> p_b) {
-  Eigen::Vector3d mean_a = Eigen::Vector3d::Zero(), mean_b = mean_a;
-  for (std::size_t i = 0; i < p_a.size(); ++i) mean_a += p_a[i], mean_b += p_b[i];
-  mean_a /= static_cast<double>(p_a.size()), mean_b /= static_cast<double>(p_b.size());
-  Eigen::Matrix3d moment = Eigen::Matrix3d::Zero();
-  for (std::size_t i = 0; i < p_a.size(); ++i) moment += (p_a[i] - mean_a) * (p_b[i] - mean_b).transpose();
-  const Eigen::Matrix3d rotation = nearest_rotation(moment);
-  return {rotation, mean_a - rotation * mean_b};
-}
-
 std::vector<Pose> three_point_poses(const std::array<Eigen::Vector3d, 3>& p_body,
                                     const std::array<Eigen::Vector3d, 3>& d_camera) {
   const Eigen::Vector3d a = p_body[2] - p_body[1], b = p_body[2] - p_body[0], c = p_body[1] - p_body[0];

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <span>
 #include <vector>
 
 #include "core/pose.h"
@@ -16,9 +15,5 @@ namespace limn::tracker {
 /// are on a line or no pose comes near.
 std::vector<Pose> three_point_poses(const std::array<Eigen::Vector3d, 3>& p_body,
                                     const std::array<Eigen::Vector3d, 3>& d_camera);
-
-/// The pose a_from_b that minimises the sum of squares |a - a_from_b b| (Kabsch 1976). The points of each set
-/// must not lie on a line.
-Pose aligned(std::span<const Eigen::Vector3d> p_a, std::span<const Eigen::Vector3d> p_b);
 
 }  // namespace limn::tracker

@@ -175,6 +175,7 @@ Result<DeviceBackend::Devices> open_devices(const device::Devices& named,
   for (const device::CameraConfig& wanted : named.cameras) {
     LIMN_TRY(auto camera, device::open_camera(wanted));
     open.cameras.push_back(std::move(camera));
+    if (wanted.sees == Spectrum::infrared) open.infrared.push_back(wanted.name);
   }
   for (device::DisplayConfig wanted : named.displays) {
     if (!wanted.name.starts_with("projector")) continue;

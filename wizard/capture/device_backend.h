@@ -1,7 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <memory>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "core/image_writer.h"
@@ -25,6 +28,7 @@ class DeviceBackend {
     std::vector<std::unique_ptr<device::Display>> projectors;
     std::function<Stamp()> now;                ///< the cameras' clock
     std::function<void(double seconds)> wait;  ///< waits this long on that clock
+    std::vector<std::string> infrared = {};    ///< names of the cameras that see no projected light
   };
   /// `wish`: a person's request, which ends the wait for a board; may be null.
   DeviceBackend(Devices devices, const calib::Board& board, std::atomic<WizardWish>* wish);
@@ -57,12 +61,16 @@ class DeviceBackend {
 Result<DeviceBackend::Devices> open_devices(const device::Devices& named,
                                             const Result<device::Desktop>& desktop);
 
-/// The devices' names and sizes, as captures list them.
+/// The devices' names and sizes, as captures list them. `infrared`: the names of those that see no projected
+/// light.
 template <typename AllDevices>
-std::vector<calib::CapturedDevice> captured_devices(const AllDevices& all) {
+std::vector<calib::CapturedDevice> captured_devices(const AllDevices& all,
+                                                    std::span<const std::string> infrared = {}) {
   std::vector<calib::CapturedDevice> list;
-  for (const auto& device : all)
+  for (const auto& device : all) {
     list.push_back({device->name(), device->size().width, device->size().height});
+    if (std::ranges::find(infrared, device->name()) != infrared.end()) list.back().sees = Spectrum::infrared;
+  }
   return list;
 }
 

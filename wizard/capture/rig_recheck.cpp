@@ -212,7 +212,8 @@ Result<Rechecked> recheck_in_place(const Rig& rig,
   LIMN_TRY(const calib::Board board, calibration_board(rig));
   const auto devices = [](const std::vector<Imager>& imagers) {
     std::vector<calib::CapturedDevice> list;
-    for (const Imager& imager : imagers) list.push_back({imager.name, imager.width, imager.height});
+    for (const Imager& imager : imagers)
+      list.push_back({imager.name, imager.width, imager.height, imager.sees});
     return list;
   };
   const fs::path captures = folder / "captures";

@@ -11,7 +11,8 @@ namespace {
 
 std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
   std::vector<calib::CapturedDevice> devices;
-  for (const Imager& imager : imagers) devices.push_back({imager.name, imager.width, imager.height});
+  for (const Imager& imager : imagers)
+    devices.push_back({imager.name, imager.width, imager.height, imager.sees});
   return devices;
 }
 

@@ -203,6 +203,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   LIMN_TRY(const calib::CaptureSet captures,
            captures_of(options.captures, options.skip_poses, options.foreign));
   LIMN_TRY_STATUS(check_axes(captures));
+  LIMN_TRY_STATUS(calib::check_spectra(captures));
   LIMN_TRY(const auto measured, measured_board(captures, options.board_measured));
   LIMN_TRY(const auto lengths, scale_bar_lengths(captures, options.scale_bar_lengths));
   LIMN_TRY_STATUS(calib::check_images(captures));

@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "core/marker.h"
+#include "core/pose.h"
 #include "core/result.h"
 
-namespace limn::tracker {
+namespace limn {
 
 /// Balls of one size that are fixed rigidly to each other: what a marker's pattern is to a square.
 struct Constellation {
@@ -30,12 +32,25 @@ std::size_t balls_needed(const Constellation& constellation);
 /// Error when the balls are too few or too many, overlap, are collinear, or look the same in another order
 /// (balls_needed() of them can be exchanged for others by a rigid motion, within the tolerance). It names the
 /// balls, counted from 0.
-Status check(const Constellation& constellation);
+Status check_constellation(const Constellation& constellation);
 
 /// Error when two have one name, or when balls_needed() balls of one lie as balls of another do.
 Status check_distinct(std::span<const Constellation> constellations);
 
+/// The family of the marker names that mean constellations: in `constellation:FILE`, FILE is a
+/// limn.constellation/1.
+inline constexpr const char* k_constellation_family = "constellation";
+bool is_constellation(const MarkerName& name);
+
+/// The same balls in the coordinate frame of what they are fixed to, under its name.
+Constellation placed(const Constellation& constellation,
+                     const std::string& name,
+                     const Pose& body_from_balls);
+
+/// The distance from the origin to the farthest point of a ball, m.
+double reach_of(const Constellation& constellation);
+
 /// Reads limn.constellation/1 (config/README.md) and checks it. Errors name the file and the key.
 Result<Constellation> load_constellation(const std::filesystem::path& path);
 
-}  // namespace limn::tracker
+}  // namespace limn

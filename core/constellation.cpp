@@ -1,4 +1,4 @@
-#include "tracker/balls/constellation.h"
+#include "core/constellation.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "core/config.h"
-#include "tracker/balls/three_point_pose.h"
+#include "core/linear_algebra.h"
 
-namespace limn::tracker {
+namespace limn {
 namespace {
 
 constexpr double k_least_ball_mm = 1, k_most_ball_mm = 1000;
@@ -105,7 +105,7 @@ std::size_t balls_needed(const Constellation& constellation) {
   return constellation.p_balls.size() <= 3 ? 3 : 4;
 }
 
-Status check(const Constellation& constellation) {
+Status check_constellation(const Constellation& constellation) {
   const auto& p = constellation.p_balls;
   const std::string& name = constellation.name;
   if (p.size() < 3 || p.size() > k_most_balls)
@@ -157,6 +157,23 @@ Status check_distinct(std::span<const Constellation> constellations) {
   return {};
 }
 
+bool is_constellation(const MarkerName& name) { return name.family == k_constellation_family; }
+
+Constellation placed(const Constellation& constellation,
+                     const std::string& name,
+                     const Pose& body_from_balls) {
+  Constellation out = constellation;
+  out.name = name;
+  for (Eigen::Vector3d& p : out.p_balls) p = body_from_balls * p;
+  return out;
+}
+
+double reach_of(const Constellation& constellation) {
+  double most = 0;
+  for (const Eigen::Vector3d& p : constellation.p_balls) most = std::max(most, p.norm());
+  return most + constellation.radius_m;
+}
+
 Result<Constellation> load_constellation(const std::filesystem::path& path) {
   LIMN_TRY(const Config config, Config::load(path, "limn.constellation/1"));
   const ConfigNode root = config.root();
@@ -175,9 +192,9 @@ Result<Constellation> load_constellation(const std::filesystem::path& path) {
     if (p_mm.size() == 3) read.p_balls.push_back(1e-3 * Eigen::Vector3d(p_mm[0], p_mm[1], p_mm[2]));
   }
   LIMN_TRY_STATUS(config.status());
-  const Status status = check(read);
+  const Status status = check_constellation(read);
   if (!status) return error("{}: balls_mm: {}", path.string(), status.message());
   return read;
 }
 
-}  // namespace limn::tracker
+}  // namespace limn
