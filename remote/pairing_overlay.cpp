@@ -62,12 +62,12 @@ cv::Mat pin_image(const std::string& pin, const std::string& role, int width) {
   return sign.rowRange(0, draw_text("Limn: " + role, k_fill / 2, next, &sign) + margin / 2).clone();
 }
 
-std::optional<session::OverlayPlace> overlay_place(const Imager& projector,
-                                                   const Pose& world_from_prototype,
-                                                   const cv::Mat& points,
-                                                   const Eigen::Vector3d& d_up,
-                                                   cv::Size shape,
-                                                   double least_px) {
+std::optional<projector::OverlayPlace> overlay_place(const Imager& projector,
+                                                     const Pose& world_from_prototype,
+                                                     const cv::Mat& points,
+                                                     const Eigen::Vector3d& d_up,
+                                                     cv::Size shape,
+                                                     double least_px) {
   const double aspect = 1.0 * shape.height / shape.width;
   const int step = std::max(1, std::min(points.cols, points.rows) / k_candidates_per_side);
   struct Candidate {
@@ -90,10 +90,10 @@ std::optional<session::OverlayPlace> overlay_place(const Imager& projector,
     }
   const auto place_at = [&](const Candidate& candidate, double width) {
     const Eigen::Vector3d d_right = width * candidate.d_right, d_down = aspect * width * candidate.d_down;
-    return session::OverlayPlace{candidate.p - 0.5 * (d_right + d_down), d_right, d_down};
+    return projector::OverlayPlace{candidate.p - 0.5 * (d_right + d_down), d_right, d_down};
   };
   // Whether the prototype covers the place and is flat there.
-  const auto is_free = [&](const session::OverlayPlace& place) {
+  const auto is_free = [&](const projector::OverlayPlace& place) {
     const double most = k_flat * place.d_right.norm();
     for (int i = 0; i <= k_nodes; ++i)
       for (int j = 0; j <= k_nodes; ++j) {
@@ -108,7 +108,7 @@ std::optional<session::OverlayPlace> overlay_place(const Imager& projector,
   };
   for (double px = points.cols; px >= least_px; px *= k_smaller)
     for (const Candidate& candidate : candidates)
-      if (const session::OverlayPlace place = place_at(candidate, px * candidate.m_per_px); is_free(place))
+      if (const projector::OverlayPlace place = place_at(candidate, px * candidate.m_per_px); is_free(place))
         return place;
   return std::nullopt;
 }

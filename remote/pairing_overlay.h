@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/imager.h"
-#include "session/overlays.h"
+#include "projector/overlays/overlays.h"
 
 namespace limn::remote {
 
@@ -24,11 +24,11 @@ cv::Mat pin_image(const std::string& pin, const std::string& role, int width);
 /// `points` holds the point of the prototype (m) at each projector pixel, CV_32FC3, NaN where there is none
 /// or where nothing may be drawn; `d_up` is up in the prototype's frame. nullopt: no place is `least_px`
 /// wide. It takes about 50 ms.
-std::optional<session::OverlayPlace> overlay_place(const Imager& projector,
-                                                   const Pose& world_from_prototype,
-                                                   const cv::Mat& points,
-                                                   const Eigen::Vector3d& d_up,
-                                                   cv::Size shape,
-                                                   double least_px);
+std::optional<projector::OverlayPlace> overlay_place(const Imager& projector,
+                                                     const Pose& world_from_prototype,
+                                                     const cv::Mat& points,
+                                                     const Eigen::Vector3d& d_up,
+                                                     cv::Size shape,
+                                                     double least_px);
 
 }  // namespace limn::remote

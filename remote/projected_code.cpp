@@ -19,10 +19,10 @@ constexpr double k_least_module_px = 2;  // smallest module in the projector's i
 constexpr double k_code_light = 0.75;    // display value; full white would outshine everything else
 
 // A place on the prototype without markers and, if there is room, without parts.
-std::optional<session::OverlayPlace> free_place(session::Session* session,
-                                                std::size_t projector,
-                                                cv::Size shape,
-                                                double least_px) {
+std::optional<projector::OverlayPlace> free_place(session::Session* session,
+                                                  std::size_t projector,
+                                                  cv::Size shape,
+                                                  double least_px) {
   cv::Mat points = session->free_surface(projector);
   if (points.empty() || shape.empty()) return std::nullopt;
   const Rig& rig = session->setup().rig;
@@ -83,7 +83,7 @@ bool ProjectedCode::start_if_due(session::Session* session, std::size_t projecto
   return true;
 }
 
-std::vector<session::Overlay> ProjectedCode::overlays(session::Session* session) {
+std::vector<projector::Overlay> ProjectedCode::overlays(session::Session* session) {
   const std::vector<Imager>& projectors = session->setup().rig.projectors;
   const auto imager = std::find_if(projectors.begin(), projectors.end(),
                                    [&](const Imager& p) { return p.name == projector_; });
@@ -92,7 +92,7 @@ std::vector<session::Overlay> ProjectedCode::overlays(session::Session* session)
   if (!start_if_due(session, projector)) return {};
   if (Clock::now() >= *shown_until_) end();
   if (sign_.empty()) return {};
-  session::SignOverlay overlay{projector, sign_, place_};
+  projector::SignOverlay overlay{projector, sign_, place_};
   if (!place_) {
     const int module_px = static_cast<int>(k_code_share * std::min(imager->width, imager->height) *
                                            k_code_module_px / sign_.cols);

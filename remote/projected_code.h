@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "session/overlays.h"
+#include "projector/overlays/overlays.h"
 #include "session/session.h"
 
 namespace limn::remote {
@@ -33,7 +33,7 @@ class ProjectedCode {
 
   /// The code, on the largest flat and free piece of the prototype, or in the middle of the image if there is
   /// none. Empty during a blackout and when the time is over.
-  std::vector<session::Overlay> overlays(session::Session* session);
+  std::vector<projector::Overlay> overlays(session::Session* session);
 
  private:
   bool start_if_due(session::Session* session, std::size_t projector);
@@ -46,7 +46,7 @@ class ProjectedCode {
   std::optional<Clock::time_point> requested_at_, searched_at_,
       shown_until_;  // nullopt before the first frame
   cv::Mat sign_;
-  std::optional<session::OverlayPlace> place_;  // its place on the prototype
+  std::optional<projector::OverlayPlace> place_;  // its place on the prototype
 };
 
 }  // namespace limn::remote

@@ -170,7 +170,9 @@ void Server::apply_edits(const session::SessionMoment& moment) {
   publish_state(moment.session, moment.telemetry, moment.health, moment.at);
 }
 
-std::vector<session::Overlay> Server::overlays(session::Session* session) { return code_.overlays(session); }
+std::vector<projector::Overlay> Server::overlays(session::Session* session) {
+  return code_.overlays(session);
+}
 
 void Server::show_code(const std::string& projector, Role role) {
   const std::string& pin = invitation_.pins[static_cast<std::size_t>(role)];

@@ -59,7 +59,7 @@ class Server : public session::SessionClient, public session::RemoteLink {
   /// for the next one.
   void apply_edits(const session::SessionMoment& moment) override;
   void publish_state(const session::SessionMoment& moment) override { apply_edits(moment); }
-  std::vector<session::Overlay> overlays(session::Session* session) override;
+  std::vector<projector::Overlay> overlays(session::Session* session) override;
 
   /// Has a projector show the code that pairs for a role, from its next image on and for
   /// ServeOptions::code_duration. Any other projector stops. Guests of lesser roles see no images of the room

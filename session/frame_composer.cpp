@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/names.h"
-#include "session/feedback.h"
+#include "projector/overlays/marker_signs.h"
 #include "session/stillness.h"
 
 namespace limn::session {
@@ -34,7 +34,7 @@ std::vector<cv::Mat> ComposedFrame::eye_images() const {
 
 std::vector<EyeImages> with_overlays(const ComposedFrame& composed,
                                      const Rig& rig,
-                                     std::span<const Overlay> overlays) {
+                                     std::span<const projector::Overlay> overlays) {
   std::vector<EyeImages> out;
   for (std::size_t i = 0; i < composed.projectors.size(); ++i) {
     out.push_back(composed.images(i));
@@ -119,8 +119,9 @@ const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
 // Draws for each eye: parts, overlays on the surface, no light on markers, signs beside markers.
 void FrameComposer::draw_projectors(const FrameInput& input) {
   const bool is_black = input.show_state.blackout;
-  const std::vector<Overlay> on_surface = surface_overlays(input.show_state);
-  const std::vector<Overlay> signs = is_black ? std::vector<Overlay>() : marker_overlays(input);
+  const std::vector<projector::Overlay> on_surface = surface_overlays(input.show_state);
+  const std::vector<projector::Overlay> signs =
+      is_black ? std::vector<projector::Overlay>() : marker_overlays(input);
   const std::vector<Body> dark = bodies_without_light(input.percepts);
   const auto eyes = limn::eyes(composed_.viewer, 1e-3 * options_.stereo_mm);
   const auto drawn = [&](std::size_t i, const Imager& eye) {
@@ -150,7 +151,7 @@ void FrameComposer::select_viewpoint(const FrameInput& input) {
   composed_.p_guest_eye_world = selected.p_guest_eye_world;
 }
 
-OverlayTarget FrameComposer::target(std::size_t projector, const Imager& viewer, cv::Mat* image) {
+projector::OverlayTarget FrameComposer::target(std::size_t projector, const Imager& viewer, cv::Mat* image) {
   return {projector, subject_->rig.projectors[projector], composed_.posed, image, &renderer_, &viewer};
 }
 
@@ -184,26 +185,26 @@ cv::Mat FrameComposer::carrier_mask(std::size_t projector,
 }
 
 // The split view (another look left of a line) and the grid.
-std::vector<Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
-  std::vector<Overlay> out;
+std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
+  std::vector<projector::Overlay> out;
   if (!composed_.posed.world_from_prototype || show_state.blackout) return out;
   if (const auto left = scene::left_of_split(subject_->scene, show_state))
-    out.push_back(SplitOverlay{scene::compose_scene(subject_->scene, *left, composed_.tracks),
-                               prototype_box_.center().x() + 1e-3 * show_state.split_mm});
-  if (show_state.grid) out.push_back(GridOverlay{});
+    out.push_back(projector::SplitOverlay{scene::compose_scene(subject_->scene, *left, composed_.tracks),
+                                          prototype_box_.center().x() + 1e-3 * show_state.split_mm});
+  if (show_state.grid) out.push_back(projector::GridOverlay{});
   return out;
 }
 
 // Rings where a part was lost, for tracking states and for markers that wait for a part, and names of
 // variants.
-std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) const {
-  std::vector<Overlay> out;
+std::vector<projector::Overlay> FrameComposer::marker_overlays(const FrameInput& input) const {
+  std::vector<projector::Overlay> out;
   const Stamp at = composed_.shown_at;
   for (const Track& track : composed_.tracks) {
     const std::optional<Stamp> lost_at = fading_.lost_at(track.body);
     const PartFading::Label* label = fading_.label(track.body);
     for (const SignPlace& place : sign_places(track)) {
-      RingOverlay ring{place.projector, place.world_from_marker, place.size_m, k_red, k_sign};
+      projector::RingOverlay ring{place.projector, place.world_from_marker, place.size_m, k_red, k_sign};
       if (lost_at) {
         ring.strength *= std::max(0.0, 1 - seconds_between(*lost_at, at) / options_.lost_s);
         out.push_back(ring);
@@ -213,8 +214,8 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
       }
       if (label) {
         const double age = seconds_between(label->since, at) / options_.label_s;
-        out.push_back(WordOverlay{place.projector, place.world_from_marker, place.size_m, label->text,
-                                  k_sign * std::min(1.0, 3 * (1 - age))});
+        out.push_back(projector::WordOverlay{place.projector, place.world_from_marker, place.size_m,
+                                             label->text, k_sign * std::min(1.0, 3 * (1 - age))});
       }
     }
   }
@@ -222,8 +223,9 @@ std::vector<Overlay> FrameComposer::marker_overlays(const FrameInput& input) con
   for (const LooseMarker& loose : waiting) {
     const double share = &loose == &waiting.back() ? 1 : k_other_waiting;
     if (const auto projector = best_projector(loose.world_from_marker))
-      out.push_back(RingOverlay{*projector, loose.world_from_marker,
-                                scene::first_marker_size_m(subject_->scene), k_blue, k_sign * share});
+      out.push_back(projector::RingOverlay{*projector, loose.world_from_marker,
+                                           scene::first_marker_size_m(subject_->scene), k_blue,
+                                           k_sign * share});
   }
   return out;
 }
@@ -242,7 +244,7 @@ std::vector<FrameComposer::SignPlace> FrameComposer::sign_places(const Track& tr
   const std::vector<Imager>& projectors = subject_->rig.projectors;
   for (std::size_t i = 0; balls && i < projectors.size(); ++i) {
     const Pose facing(projectors[i].imager_from_world.rotation.inverse(), track.world_from_body.translation);
-    if (!(head_on(projectors[i], facing) > 0)) continue;
+    if (!(projector::head_on(projectors[i], facing) > 0)) continue;
     places.push_back({i, facing, 2 * reach_of(*balls)});
     break;
   }
@@ -255,7 +257,7 @@ std::optional<std::size_t> FrameComposer::best_projector(const Pose& world_from_
   double most = 0;
   const std::vector<Imager>& projectors = subject_->rig.projectors;
   for (std::size_t i = 0; i < projectors.size(); ++i) {
-    const double cosine = head_on(projectors[i], world_from_marker);
+    const double cosine = projector::head_on(projectors[i], world_from_marker);
     if (cosine <= most) continue;
     most = cosine;
     best = i;

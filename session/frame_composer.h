@@ -10,13 +10,13 @@
 #include "core/result.h"
 #include "core/rig.h"
 #include "core/stereo.h"
+#include "projector/overlays/overlays.h"
 #include "projector/renderer.h"
 #include "scene/part_boxes.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 #include "session/drift_watch.h"
 #include "session/frame_input.h"
-#include "session/overlays.h"
 #include "session/part_fading.h"
 #include "session/perception.h"
 #include "session/projection_history.h"
@@ -49,7 +49,7 @@ struct ComposedFrame {
 /// memory of `composed`.
 std::vector<EyeImages> with_overlays(const ComposedFrame& composed,
                                      const Rig& rig,
-                                     std::span<const Overlay> overlays);
+                                     std::span<const projector::Overlay> overlays);
 
 /// Loose markers that have been still for a second and carry no slot; a ring of light marks them. `pair`
 /// without a marker uses the last one.
@@ -100,12 +100,12 @@ class FrameComposer {
                 projector::Renderer renderer,
                 const ComposeOptions& options);
   void select_viewpoint(const FrameInput& input);
-  std::vector<Overlay> surface_overlays(const scene::ShowState& show_state) const;
-  std::vector<Overlay> marker_overlays(const FrameInput& input) const;
+  std::vector<projector::Overlay> surface_overlays(const scene::ShowState& show_state) const;
+  std::vector<projector::Overlay> marker_overlays(const FrameInput& input) const;
   void draw_projectors(const FrameInput& input);
   cv::Mat keep_off_markers(const cv::Mat& image, std::size_t projector, std::span<const Body> bodies) const;
   std::vector<Body> bodies_without_light(const Percepts& percepts) const;
-  OverlayTarget target(std::size_t projector, const Imager& viewer, cv::Mat* image);
+  projector::OverlayTarget target(std::size_t projector, const Imager& viewer, cv::Mat* image);
   bool is_stereo(std::size_t projector) const;
   std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;
   // A place for the signs of a body, in front of one projector.

@@ -99,10 +99,10 @@ bool FrameLoop::publish_to_clients(const ShownFrame* shown, const cv::Mat& scree
   return goes_on;
 }
 
-std::vector<Overlay> FrameLoop::client_overlays() {
-  std::vector<Overlay> out;
+std::vector<projector::Overlay> FrameLoop::client_overlays() {
+  std::vector<projector::Overlay> out;
   for (SessionClient* client : parts_.clients)
-    for (Overlay& overlay : client->overlays(&parts_.session)) out.push_back(std::move(overlay));
+    for (projector::Overlay& overlay : client->overlays(&parts_.session)) out.push_back(std::move(overlay));
   return out;
 }
 

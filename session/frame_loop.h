@@ -98,7 +98,7 @@ class FrameLoop {
  private:
   void apply_client_edits();
   bool publish_to_clients(const ShownFrame* shown, const cv::Mat& screen);
-  std::vector<Overlay> client_overlays();
+  std::vector<projector::Overlay> client_overlays();
   std::vector<ScreenImages> screen_images();
   void note_devices();
 

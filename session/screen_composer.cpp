@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/screen_encoding.h"
-#include "session/grid_and_split.h"
+#include "projector/overlays/grid_and_split.h"
 #include "session/stillness.h"
 
 namespace limn::session {
@@ -127,10 +127,10 @@ cv::Mat ScreenComposer::with_split(const ScreenInput& input,
   const cv::Mat image = draw(posed);
   const auto left = scene::left_of_split(*scene_, input.show_state);
   if (!left) return image;
-  const auto line = split_line(seen_from, posed, prototype_box_, input.show_state.split_mm);
+  const auto line = projector::split_line(seen_from, posed, prototype_box_, input.show_state.split_mm);
   if (!line) return image;
-  return split_along(*line, draw_other(scene::compose_scene(*scene_, *left, input.cameras[camera].tracks)),
-                     image);
+  return projector::split_along(
+      *line, draw_other(scene::compose_scene(*scene_, *left, input.cameras[camera].tracks)), image);
 }
 
 const std::optional<projector::StereoCameras>& ScreenComposer::stereo_cameras() {

@@ -3,8 +3,8 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "projector/overlays/overlays.h"
 #include "session/device_health.h"
-#include "session/overlays.h"
 #include "session/session.h"
 #include "session/telemetry.h"
 
@@ -33,7 +33,7 @@ class SessionClient {
   virtual void publish_state(const SessionMoment& moment) = 0;
 
   /// Overlays for the projected light only: recorded and reported images are without them.
-  virtual std::vector<Overlay> overlays(Session*) { return {}; }
+  virtual std::vector<projector::Overlay> overlays(Session*) { return {}; }
   /// Whether the next publish_state() needs an image of the screen.
   virtual bool wants_screen() const { return false; }
   /// Whether this client has ended the session.

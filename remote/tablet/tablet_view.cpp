@@ -24,12 +24,12 @@
 #include "device/gl_context.h"
 #include "device/jpeg.h"
 #include "projector/composite_policy.h"
+#include "projector/overlays/grid_and_split.h"
 #include "projector/renderer.h"
 #include "remote/tablet/intrinsics_store.h"
 #include "remote/tablet/tablet_image.h"
 #include "remote/tablet/tablet_localizer.h"
 #include "scene/posed_scene.h"
-#include "session/grid_and_split.h"
 #include "session/stillness.h"
 #include "tracker/family.h"
 
@@ -291,12 +291,12 @@ cv::Mat TabletView::Impl::split_composite(const Imager& camera,
                                           SplitDrawState* draw_state) {
   cv::Mat right = composite_of(camera, image, posed, snapshot, parts, &draw_state->right);
   const auto left = scene::left_of_split(*snapshot.scene, snapshot.show_state);
-  const auto line = left ? session::split_line(camera, posed, prototype_box, snapshot.show_state.split_mm)
+  const auto line = left ? projector::split_line(camera, posed, prototype_box, snapshot.show_state.split_mm)
                          : std::optional<cv::Vec3d>();
   if (!line) return right;
   const scene::PosedScene other = scene::compose_scene(*snapshot.scene, *left, tracks);
-  return session::split_along(*line, composite_of(camera, image, other, snapshot, parts, &draw_state->left),
-                              right);
+  return projector::split_along(*line, composite_of(camera, image, other, snapshot, parts, &draw_state->left),
+                                right);
 }
 
 // An image with parts. As the room's screen shows them, `view` parts are drawn whole if they are projected

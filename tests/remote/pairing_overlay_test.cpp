@@ -74,7 +74,7 @@ TEST(CodeSign, IsReadOnThePrototype) {
   const double ms = 1e3 * seconds_between(begun, std::chrono::steady_clock::now());
   ASSERT_TRUE(place.has_value());
   light[0] = light[0].clone();
-  draw_pairing_overlay(sign, *place, setup.rig.projectors[0], world_from_prototype, &light[0]);
+  projector::draw_pairing_overlay(sign, *place, setup.rig.projectors[0], world_from_prototype, &light[0]);
   ASSERT_TRUE(write_png(folder / "light.png", light[0]));
   const Eigen::Vector3d p_middle =
       world_from_prototype * (place->p_corner + 0.5 * (place->d_right + place->d_down));
@@ -100,7 +100,7 @@ TEST(CodeSign, IsReadOnThePrototype) {
       overlay_place(setup.rig.projectors[0], world_from_prototype, points, d_up, pin.size(), 110);
   ASSERT_TRUE(wide.has_value());
   cv::Mat alone(light[0].size(), CV_8UC3, cv::Scalar::all(0));
-  draw_pairing_overlay(pin, *wide, setup.rig.projectors[0], world_from_prototype, &alone);
+  projector::draw_pairing_overlay(pin, *wide, setup.rig.projectors[0], world_from_prototype, &alone);
   ASSERT_TRUE(write_png(folder / "pin.png", alone));
   EXPECT_GT(cv::countNonZero(alone.reshape(1)), 3 * 110 * 40 / 2);
   // It would not be on the door.

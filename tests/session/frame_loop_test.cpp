@@ -63,9 +63,9 @@ class Notes final : public FrameClock, public FrameSource, public FrameSink, pub
       EXPECT_EQ(moment.shown->shown_at, shifted(now(), 0.04));
     }
   }
-  std::vector<Overlay> overlays(Session*) override {
+  std::vector<projector::Overlay> overlays(Session*) override {
     calls += "overlay ";
-    return {SignOverlay{0, cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(255)), std::nullopt}};
+    return {projector::SignOverlay{0, cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(255)), std::nullopt}};
   }
   bool ends_session() const override { return ends; }
 

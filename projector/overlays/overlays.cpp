@@ -1,12 +1,12 @@
-#include "session/overlays.h"
+#include "projector/overlays/overlays.h"
 
 #include <array>
 #include <opencv2/imgproc.hpp>
 
-#include "session/feedback.h"
-#include "session/grid_and_split.h"
+#include "projector/overlays/grid_and_split.h"
+#include "projector/overlays/marker_signs.h"
 
-namespace limn::session {
+namespace limn::projector {
 namespace {
 
 // A sign is drawn this many times larger and then made smaller, so that its edges are smooth.
@@ -100,4 +100,4 @@ void draw_pairing_overlay(const cv::Mat& sign,
   drawn.copyTo((*image)(box), share > 127);
 }
 
-}  // namespace limn::session
+}  // namespace limn::projector

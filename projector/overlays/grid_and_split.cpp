@@ -1,4 +1,4 @@
-#include "session/grid_and_split.h"
+#include "projector/overlays/grid_and_split.h"
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -9,7 +9,7 @@
 
 #include "core/photometric_response.h"
 
-namespace limn::session {
+namespace limn::projector {
 namespace {
 
 using Eigen::Vector3f;
@@ -140,4 +140,4 @@ std::optional<cv::Vec3d> split_line(const Imager& imager,
   return abc[0] * px[2].x() + abc[1] * px[2].y() + abc[2] < 0 ? abc : -abc;
 }
 
-}  // namespace limn::session
+}  // namespace limn::projector

@@ -7,13 +7,13 @@
 #include "core/imager.h"
 #include "scene/posed_scene.h"
 
-namespace limn::session {
+namespace limn::projector {
 
 /// Draws grid lines on the prototype's surface at multiples of 10 mm of its own coordinates, stronger ones at
 /// multiples of 50 mm, for the two coordinates that run along the surface. Draws into an 8-bit BGR display
 /// image; each pixel keeps the brighter value. `points`: the point of the prototype (its frame, m) that each
 /// pixel illuminates, CV_32FC3, NaN where none. `share`: this projector's share of the light there, CV_32FC2
-/// (projector::Renderer::blend).
+/// (Renderer::blend).
 void draw_grid(const cv::Mat& points, const cv::Mat& share, cv::Mat* image);
 
 /// Joins two images: pixels that illuminate points with x below `x_m` come from `left`, others from `right`,
@@ -33,4 +33,4 @@ std::optional<cv::Vec3d> split_line(const Imager& imager,
                                     const Eigen::AlignedBox3d& prototype_box,
                                     double split_mm);
 
-}  // namespace limn::session
+}  // namespace limn::projector

@@ -5,7 +5,7 @@
 
 #include "core/imager.h"
 
-namespace limn::session {
+namespace limn::projector {
 
 /// Cosine of the angle at which a projector's light meets a marker; 0 if the light does not reach it. Only
 /// the projector with the largest cosine draws beside a marker: on a curved surface two would draw everything
@@ -33,4 +33,4 @@ void draw_word(const Imager& projector,
                double strength,
                cv::Mat* image);
 
-}  // namespace limn::session
+}  // namespace limn::projector

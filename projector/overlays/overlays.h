@@ -13,7 +13,7 @@
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 
-namespace limn::session {
+namespace limn::projector {
 
 // Overlays are drawn over the projectors' images of the parts. They are values in a list, in drawing order;
 // only draw() draws them.
@@ -70,7 +70,7 @@ struct OverlayTarget {
   cv::Mat* image = nullptr;
   /// Split and grid depend on the surface: they need the renderer that drew the image, and the viewer for
   /// whom it was drawn. Null: they are left out.
-  projector::Renderer* renderer = nullptr;
+  Renderer* renderer = nullptr;
   const Imager* viewer = nullptr;
 };
 
@@ -85,4 +85,4 @@ void draw_pairing_overlay(const cv::Mat& sign,
                           const Pose& world_from_prototype,
                           cv::Mat* image);
 
-}  // namespace limn::session
+}  // namespace limn::projector

@@ -1,4 +1,4 @@
-#include "session/feedback.h"
+#include "projector/overlays/marker_signs.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-namespace limn::session {
+namespace limn::projector {
 namespace {
 
 // In marker sides. Ring and word are well away from the marker's paper, so that their light does not hide the
@@ -88,4 +88,4 @@ void draw_word(const Imager& projector,
   add(light, image);
 }
 
-}  // namespace limn::session
+}  // namespace limn::projector
