@@ -315,7 +315,7 @@ TEST(BallFinder, TouchingSpheresAreBothFound) {
         add(lens, ball, near, &errors);
       }
     }
-    EXPECT_GE(errors.found, 34);
+    EXPECT_GE(errors.found, 28);
     EXPECT_LT(errors.rms(), 0.1);
     EXPECT_LT(errors.deviation_share(), 1.6);
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 #include <optional>
 
@@ -65,10 +66,27 @@ class CircleSearch {
       for (std::size_t i = 0; i < boundary_.size(); ++i)
         is_used_[i] = is_used_[i] || circle->suits(boundary_[i]);
     }
-    return found;
+    std::vector<CircleArcs> explained;
+    std::ranges::copy_if(found, std::back_inserter(explained),
+                         [&](const CircleArcs& one) { return !sticks_out(one, found); });
+    return explained;
   }
 
  private:
+  // Whether the boundary has points outside a circle that no other circle explains: what hides a part of a
+  // sphere only takes away.
+  bool sticks_out(const CircleArcs& one, std::span<const CircleArcs> all) const {
+    constexpr std::ptrdiff_t k_by_chance = 2;
+    const Circle circle{one.centre, one.radius};
+    const auto is_strange = [&](const Eigen::Vector2d& p) {
+      return circle.off(p) > 2 * (k_off_px + k_off_share * circle.radius) &&
+             std::ranges::none_of(all, [&](const CircleArcs& other) {
+               return Circle{other.centre, other.radius}.suits(p);
+             });
+    };
+    return std::ranges::count_if(boundary_, is_strange) > k_by_chance;
+  }
+
   bool is_possible(const Circle& circle) const {
     return circle.radius >= min_radius_ && circle.radius <= max_radius_;
   }

@@ -47,12 +47,12 @@ constexpr double k_most_residual_share = 0.08;  // RMS residual over the contras
 constexpr double k_noise_levels = 3;
 constexpr double k_least_sector_share = 0.15;  // contrast of the weaker sectors, as share of the mean
 constexpr int k_most_weak_sectors = 3;
-constexpr double k_partial_share = 0.4;   // these limits for an outline that is shown in part
+constexpr double k_partial_share = 0.35;  // these limits for an outline that is shown in part
 constexpr double k_partial_variance = 2;  // an arc shows less of what disturbs it
 constexpr double k_least_disturbed = 4;   // levels
 constexpr int k_most_fits = 3;            // each leaves out the parts that disturbed the one before
 constexpr std::size_t k_least_kept = 17;  // parts; fewer suit what is no sphere, too
-constexpr int k_most_gaps = 2;            // what hides a part leaves one gap; what is no sphere has more
+constexpr int k_most_gaps = 1;            // what hides a part leaves one gap; what is no sphere has more
 constexpr double k_most_disturbed = 2.5;  // a part's residual over the median of all parts
 constexpr double k_most_stddev_px = 0.3;
 // The radius is known to this at best: pixels and blur are not quite Gaussian.
