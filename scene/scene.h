@@ -22,9 +22,9 @@ namespace limn::scene {
 struct Prototype {
   Mesh mesh;
   std::vector<BodyMarker> markers;                  ///< body_from_marker is prototype_from_marker.
-  std::optional<Constellation> constellation = {};  ///< Balls instead of markers, in the prototype's frame.
   double albedo = 0.8;                              ///< Diffuse albedo, used without albedo_image.
   cv::Mat albedo_image;                             ///< 8-bit BGR sRGB in the mesh's uv; empty: none.
+  std::optional<Constellation> constellation = {};  ///< Balls instead of markers, in the prototype's frame.
 };
 
 enum class Mode {
