@@ -108,16 +108,19 @@ Json error_maps_json(const Report& report) {
   return list;
 }
 
-// All models that were tried; only the given ones where nothing was selected.
+// All models that were tried, those without a solution without numbers; only the given ones where nothing was
+// selected.
 Json lenses_json(const Report& report) {
   Json list = Json::array();
-  for (const ModelTrial& trial : report.lens_trials)
-    list.push_back({{"device", trial.device},
-                    {"model", trial.model},
-                    {"held_out_px", rounded(trial.held_out_px)},
+  for (const ModelTrial& trial : report.lens_trials) {
+    Json entry = {{"device", trial.device}, {"model", trial.model}};
+    if (std::isfinite(trial.held_out_px))
+      entry.update({{"held_out_px", rounded(trial.held_out_px)},
                     {"gain", rounded(trial.gain)},
-                    {"uncertainty", rounded(trial.uncertainty)},
-                    {"chosen", trial.chosen}});
+                    {"uncertainty", rounded(trial.uncertainty)}});
+    entry["chosen"] = trial.chosen;
+    list.push_back(std::move(entry));
+  }
   if (!report.lens_trials.empty()) return list;
   for (const auto* imagers : {&report.solution.rig.cameras, &report.solution.rig.projectors}) {
     for (const Imager& imager : *imagers)

@@ -195,11 +195,13 @@ TEST(Assess, HeldOutErrorIsTheNoiseOfTheCells) {
   EXPECT_EQ(score->poses.size(), 8U);
   EXPECT_GT(score->rms_px, 0.1 * std::sqrt(2.0) * 0.97);  // RMS of the 2-vector
   EXPECT_LT(score->rms_px, 0.1 * std::sqrt(2.0) * 1.15);
-  // 0.1 px at 1600 px focal length and 1.1 m are 0.07 mm; 95 % of a Rayleigh distribution is 2.45 times that.
+  // 0.1 px at 1600 px focal length and 1.1 m are 0.07 mm; 95 % of a Rayleigh distribution is 2.45 times that,
+  // 0.18 mm. This noise of single matches is no error of the rig, which is smaller.
   Observed observed{world.observations, {{0, 0, 0, 1000, 900, 2}}, {}, 0, 0};
   const auto assessment = assess(observed, {}, *solution);
   ASSERT_TRUE(assessment.ok()) << assessment.message();
-  EXPECT_NEAR(assessment->predicted_error_mm[0], 0.18, 0.06);
+  EXPECT_GT(assessment->predicted_error_mm[0], 0.04);
+  EXPECT_LT(assessment->predicted_error_mm[0], 0.14);
   EXPECT_EQ(assessment->verdict, Verdict::good);
   EXPECT_DOUBLE_EQ(assessment->decoded_share, 0.9);
 }
