@@ -891,9 +891,10 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option("--osc-to", options->osc_to, "HOST:PORT to which changes are sent by OSC");
   command->add_option("--trackers", options->trackers,
                       "File that names other tracking systems whose poses are used (limn.trackers/1)");
-  command->add_option("--poses-out", options->poses_out,
-                      "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
-                      "freed or json; may be repeated");
+  command->add_option(
+      "--poses-out", options->poses_out,
+      "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
+      "freed or json; may be repeated");
   command->add_option("--serve", options->serve,
                       "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
                       "machine only, a network address is encrypted");

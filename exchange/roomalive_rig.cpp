@@ -55,7 +55,7 @@ Result<Eigen::MatrixXd> matrix_by_columns(const RigEntry& outer,
     for (int row = 0; row < rows; ++row) {
       const DataNode& item = list.items[static_cast<std::size_t>(row)];
       const auto number = item.is_text() ? limn::number_in(item.text) : std::nullopt;
-      if (!number || !std::isfinite(*number)) return problem("'" + item.text.substr(0, 40) + "'");
+      if (!number || !std::isfinite(*number)) return problem(fmt::format("'{}'", item.text.substr(0, 40)));
       matrix(row, column) = *number;
     }
   }

@@ -110,9 +110,9 @@ class FrameComposer {
   std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;
   // A place for the signs of a body, in front of one projector.
   struct SignPlace {
-    std::size_t projector;
-    Pose world_from_marker;
-    double size_m;
+    std::size_t projector = 0;
+    Pose world_from_marker = {};
+    double size_m = 0;
   };
   std::vector<SignPlace> sign_places(const Track& track) const;
   cv::Mat carrier_mask(std::size_t projector,

@@ -24,11 +24,11 @@
 #include <optional>
 
 #include "core/image_io.h"
+#include "core/latest.h"
 #include "core/median.h"
 #include "core/scale_resolution.h"
 #include "device/gl_context.h"
 #include "device/jpeg.h"
-#include "core/latest.h"
 #include "session/perception.h"
 #include "session/recording.h"
 #include "session/script.h"

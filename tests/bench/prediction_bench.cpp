@@ -223,7 +223,8 @@ Pose measured_at(const Sequence& sequence, double at_s) {
 
 double way_m(const Sequence& sequence) {
   double way = 0;
-  for (std::size_t i = 15; i < sequence.known.size(); i += 15)  // in steps of half a second: noise is no motion
+  for (std::size_t i = 15; i < sequence.known.size();
+       i += 15)  // in steps of half a second: noise is no motion
     way += (sequence.known[i].fixes.back().world_from_body.translation -
             sequence.known[i - 15].fixes.back().world_from_body.translation)
                .norm();

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/file.h"
+#include "device/udp_socket.h"
 #include "gui/qr_code.h"
 #include "remote/api/auth_sessions.h"
 #include "remote/api/guest_name.h"
@@ -16,7 +17,6 @@
 #include "remote/http/http.h"
 #include "remote/http/own_addresses.h"
 #include "remote/http/static_files.h"
-#include "device/udp_socket.h"
 #include "tests/support/matchers.h"
 
 namespace limn::remote {

@@ -9,10 +9,10 @@
 #include <thread>
 
 #include "core/file.h"
+#include "core/file_writer.h"
 #include "core/image_io.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
-#include "core/file_writer.h"
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
 

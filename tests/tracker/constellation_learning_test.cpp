@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include "core/linear_algebra.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random.h"
 #include "tests/tracker/seen_balls.h"
 #include "tests/tracker/seen_body.h"
-#include "core/linear_algebra.h"
 
 namespace limn::tracker {
 namespace {

@@ -171,7 +171,7 @@ class Room {
     walk_ = walk_through(p_middle_, rng_);
     LIMN_CHECK(write_file(folder / "path.json", path_of(walk_).dump()).ok());
     remote::ServeOptions serve;
-    serve.at = "0";
+    serve.at = std::string("0");
     serve.keys = folder / "keys";
     server_ = remote::Server::open(serve, {}).value();
   }

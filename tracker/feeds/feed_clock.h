@@ -26,8 +26,8 @@ class FeedClock {
 
  private:
   struct Least {
-    Stamp from;    // the begin of this part of the window
-    double lag_s;  // the smallest in it
+    Stamp from;        // the begin of this part of the window
+    double lag_s = 0;  // the smallest in it
   };
   void disagree(const std::string& how);
   void add(double lag_s, Stamp arrived_at);
