@@ -190,7 +190,7 @@ class ExplanationSearch {
       }
       std::ranges::sort(near);
       for (const auto& [off, match] : near)
-        if (std::ranges::none_of(matches, [&](const BallMatch& other) {
+        if (std::ranges::none_of(matches, [view, match = match](const BallMatch& other) {
               return other.view == view &&
                      (other.ball == match.ball || other.in_constellation == match.in_constellation);
             }))
