@@ -575,6 +575,13 @@ std::vector<Constellation> constellations(const Scene& scene) {
   return out;
 }
 
+std::vector<std::string> body_names(const Scene& scene) {
+  std::vector<std::string> out;
+  for (const Body& body : bodies(scene)) out.push_back(body.name);
+  for (const Constellation& balls : constellations(scene)) out.push_back(balls.name);
+  return out;
+}
+
 double first_marker_size_m(const Scene& scene) {
   const auto square = std::ranges::find_if(scene.slots, [](const Slot& slot) { return !slot.constellation; });
   return square == scene.slots.end() ? 0 : square->size_m;

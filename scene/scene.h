@@ -135,6 +135,8 @@ Result<Imager> load_viewer(const std::filesystem::path& path);
 std::vector<Body> bodies(const Scene& scene);
 /// The bodies that carry balls, with the same names, in their bodies' frames.
 std::vector<Constellation> constellations(const Scene& scene);
+/// The names of all bodies, those with markers first.
+std::vector<std::string> body_names(const Scene& scene);
 /// The side of the first slot's square marker, m; 0 when no slot has one.
 double first_marker_size_m(const Scene& scene);
 /// The body's name of a viewer's marker. It differs from every slot's name.

@@ -41,11 +41,13 @@ std::vector<OperatorView::Image> cameras_of(const Session& session) {
 
 std::vector<OperatorView::Body> bodies_of(const Session& session) {
   std::vector<OperatorView::Body> out;
-  for (const Body& body : scene::bodies(session.setup().scene)) {
+  for (const Body& body : scene::bodies(session.setup().scene))
     out.push_back({body.name, list_of(body.markers), std::nullopt});
+  for (const Constellation& balls : scene::constellations(session.setup().scene))
+    out.push_back({balls.name, fmt::format("{} balls", balls.p_balls.size()), std::nullopt});
+  for (OperatorView::Body& body : out)
     for (const Track& track : session.composed().tracks)
-      if (track.body == body.name) out.back().track = track;
-  }
+      if (track.body == body.name) body.track = track;
   return out;
 }
 

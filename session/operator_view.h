@@ -33,7 +33,7 @@ struct OperatorView {
   };
   struct Body {
     std::string name;
-    std::string markers;         ///< their names
+    std::string markers;         ///< their names; or how many balls
     std::optional<Track> track;  ///< absent: not seen yet
   };
   struct Slot {

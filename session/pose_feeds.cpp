@@ -19,7 +19,7 @@ constexpr int k_most_thrown_away = 4096;  // datagrams of a flood in one call
 // The names by which a trackers' file calls the scene's bodies, and the tracker's names for them.
 std::map<std::string, tracker::FeedBody> named_bodies(const scene::Scene& scene) {
   std::map<std::string, tracker::FeedBody> out;
-  for (const Body& body : scene::bodies(scene)) out[body.name] = {"", body.name, std::nullopt};
+  for (const std::string& name : scene::body_names(scene)) out[name] = {"", name, std::nullopt};
   for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
     const scene::Viewer& viewer = scene.viewers[i];
     out.erase(scene::viewer_body(i));

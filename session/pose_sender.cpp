@@ -32,10 +32,10 @@ void send_json(device::UdpSocket* socket, const std::vector<ForeignPose>& poses)
 std::vector<ForeignPose> sent_poses(const scene::Scene& scene, const ComposedFrame& composed) {
   std::vector<ForeignPose> poses;
   const double at_s = seconds_of(composed.shown_at);
-  for (const Body& body : scene::bodies(scene)) {
-    ForeignPose pose{body.name, {}};
+  for (const std::string& name : scene::body_names(scene)) {
+    ForeignPose pose{name, {}};
     pose.time_s = at_s;
-    const auto track = std::ranges::find(composed.tracks, body.name, &Track::body);
+    const auto track = std::ranges::find(composed.tracks, name, &Track::body);
     pose.is_lost = track == composed.tracks.end() || track->tracking == TrackingState::lost;
     if (!pose.is_lost) pose.feed_from_sensor = track->world_from_body;
     poses.push_back(std::move(pose));

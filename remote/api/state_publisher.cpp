@@ -23,7 +23,7 @@ ordered_json numberless_state(const SessionState& session,
   state["guests"] = ordered_json::array();
   for (const auto& client : clients) {
     ordered_json guest = {{"name", client->guest.name}, {"role", name_of(client->guest.role)}};
-    if (client->glasses) guest["glasses"] = name_of(client->glasses->registration.state());
+    if (client->glasses) guest["glasses"] = k_glasses_states.text(client->glasses->registration.state());
     state["guests"].push_back(std::move(guest));
   }
   state["comments"] = ordered_json::array();

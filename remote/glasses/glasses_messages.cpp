@@ -42,7 +42,7 @@ std::string glasses_message(const GlassesRegistration& registration,
                             const std::string& marker,
                             std::span<const std::string> markers) {
   ordered_json out = {{"type", "glasses"},
-                      {"state", name_of(registration.state())},
+                      {"state", k_glasses_states.text(registration.state())},
                       {"why", registration.advice()},
                       {"marker", marker},
                       {"markers", std::vector<std::string>(markers.begin(), markers.end())}};

@@ -75,22 +75,6 @@ Matrix6d drift_about(const Vector3d& p, const Pose& world_from_feed, const Matri
 
 }  // namespace
 
-const char* name_of(GlassesState state) {
-  switch (state) {
-    case GlassesState::waiting:
-      return "waiting";
-    case GlassesState::looking_round:
-      return "looking_round";
-    case GlassesState::registered:
-      return "registered";
-    case GlassesState::lost:
-      return "lost";
-    case GlassesState::asleep:
-      return "asleep";
-  }
-  return "";
-}
-
 GlassesRegistration::GlassesRegistration(std::string marker, const GlassesOptions& options)
     : marker_(std::move(marker)), options_(options) {}
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/enum_names.h"
 #include "core/pose.h"
 #include "core/result.h"
 #include "tracker/hand_eye.h"
@@ -33,8 +34,8 @@ enum class GlassesState {
   lost,           ///< The glasses do not track, or their poses no longer arrive.
   asleep          ///< The page is hidden, or the glasses were taken off.
 };
-/// "waiting", "looking_round", "registered", "lost" or "asleep".
-const char* name_of(GlassesState state);
+inline constexpr EnumNames<GlassesState, 5> k_glasses_states{
+    {"waiting", "looking_round", "registered", "lost", "asleep"}};
 
 struct GlassesOptions {
   /// How much the odometry drifts, as a random walk: standard deviations after one second. Larger values
@@ -137,8 +138,8 @@ class GlassesRegistration {
   bool is_feed_new_ = false;  // the odometry may have jumped
   bool is_suspended_ = false, is_asleep_ = false;
   int rejected_in_turn_ = 0, accepted_since_start_ = 0;
-  Eigen::Quaterniond started_facing_;  // when the feed was new
-  double turned_rad_ = 0;              // the largest turn since then
+  Eigen::Quaterniond started_facing_ = Eigen::Quaterniond::Identity();  // when the feed was new
+  double turned_rad_ = 0;                                               // the largest turn since then
   int used_ = 0, left_out_ = 0;
   std::string problem_;  // why the filter could not be started
   GlassesState state_ = GlassesState::waiting;

@@ -2,13 +2,16 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <filesystem>
 
+#include "apps/live.h"
 #include "apps/replay.h"
 #include "core/file.h"
 #include "core/scale_resolution.h"
 #include "device/gl_context.h"
+#include "device/udp_socket.h"
 #include "exchange/poses/free_d.h"
 #include "exchange/poses/pose_json.h"
 #include "exchange/poses/posi_stage_net.h"
@@ -282,6 +285,57 @@ TEST(Trackers, OnlyTheNamedSenderIsAccepted) {
   EXPECT_TRUE(input.is_empty());
   ASSERT_EQ(input.notes.size(), 1U);
   EXPECT_NE(input.notes[0].find("127.0.0.9"), std::string::npos);
+}
+
+// Bodies with balls are known to other programs as those with markers are.
+TEST(Trackers, BodiesWithBallsAreReceivedAndSent) {
+  const auto scene = scene::load_scene(fs::path(LIMN_SOURCE_DIR) / "config/scenes/balls");
+  ASSERT_TRUE(scene) << scene.message();
+  const fs::path file = test::test_folder() / "trackers.json";
+  write_json(file, {{"schema", "limn.trackers/1"},
+                    {"trackers", json::array({{{"name", "stage"},
+                                               {"protocol", "json"},
+                                               {"receive", 9010},
+                                               {"bodies", {{"wand", "badge"}, {"frame", "prototype"}}}}})}});
+  const auto feeds = load_feeds(file, *scene);
+  ASSERT_TRUE(feeds) << feeds.message();
+  EXPECT_EQ((*feeds)[0].setup.bodies.size(), 2U);
+  ComposedFrame composed;
+  Track track;
+  track.body = "badge";
+  track.world_from_body = Pose(exp_rotation({0.3, 0.2, -0.4}), {0.1, -0.2, 0.3});
+  composed.tracks = {track};
+  const std::vector<ForeignPose> poses = sent_poses(*scene, composed);
+  const auto badge = std::ranges::find(poses, "badge", &ForeignPose::sensor);
+  ASSERT_NE(badge, poses.end());
+  EXPECT_FALSE(badge->is_lost);
+  EXPECT_TRUE(test::pose_near(badge->feed_from_sensor, track.world_from_body, 1e-6_deg, 1e-9));
+}
+
+// What a session puts on the network, read from it.
+TEST(Trackers, ASessionSendsPosesAtEachFrame) {
+  auto socket = device::UdpSocket::receiving({"127.0.0.1", "0"});
+  ASSERT_TRUE(socket) << socket.message();
+  apps::LiveOptions options;
+  options.resolution = 0.25;
+  options.seconds = 0.2;
+  options.poses_out = {fmt::format("json:127.0.0.1:{}", socket->port())};
+  const Status lived = apps::run_live(options);
+  ASSERT_TRUE(lived.ok()) << lived.message();
+  std::vector<std::uint8_t> bytes(65536);
+  int datagrams = 0;
+  std::vector<ForeignPose> last;
+  while (const auto datagram = socket->next(bytes)) {
+    const auto poses = exchange::poses_of_json(
+        std::string_view(reinterpret_cast<const char*>(bytes.data()), datagram->length));
+    ASSERT_TRUE(poses) << poses.message();
+    last = *poses;
+    ++datagrams;
+  }
+  EXPECT_GE(datagrams, 5);
+  const auto prototype = std::ranges::find(last, "prototype", &ForeignPose::sensor);
+  ASSERT_NE(prototype, last.end());
+  EXPECT_FALSE(prototype->is_lost);
 }
 
 // What is sent out in each form comes in again as the same poses.

@@ -335,8 +335,7 @@ void FeedRegistration::solve() {
       noise.turn > k_least_misfit * std::max(noise_.turn, 0.5 / k_degrees)) {
     advice_ = fmt::format(
         "its poses do not move as the body does (off by {:.0f} mm and {:.1f} degrees). Is it fixed to this "
-        "body, "
-        "are its units right, and is its frame right-handed (\"left_handed\")?",
+        "body, are its units right, and is its frame right-handed (\"left_handed\")?",
         1e3 * noise.shift, noise.turn * k_degrees);
     registration_.reset();
     return;
