@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/names.h"
 #include "remote/glasses/glasses_messages.h"
 
 namespace limn::remote {
@@ -35,12 +36,6 @@ const char* words_of(GlassesState state) {
   return "";
 }
 
-std::string joined(std::span<const std::string> names) {
-  std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
-  return out;
-}
-
 }  // namespace
 
 // The markers of the scene's viewers.
@@ -67,7 +62,8 @@ Result<std::string> GlassesClients::marker_for(const std::shared_ptr<WsClient>& 
         "glasses: expected a viewer with a marker in scene.json, found none. Fix a marker to the glasses and "
         R"(add "viewer": {{"marker": "FAMILY:ID", "size_mm": …}}.)");
   if (!wish.empty() && std::find(all.begin(), all.end(), wish) == all.end())
-    return error("glasses: marker: expected one of the scene's viewers ({}), found another.", joined(all));
+    return error("glasses: marker: expected one of the scene's viewers ({}), found another.",
+                 joined_names(all));
   for (const std::string& marker : all)
     if ((wish.empty() || wish == marker) && !user_of(marker, client)) return marker;
   const std::string& taken = wish.empty() ? all.front() : wish;

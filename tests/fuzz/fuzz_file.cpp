@@ -5,6 +5,7 @@
 #include "core/camera_files/imager_file.h"
 #include "core/file.h"
 #include "core/log.h"
+#include "core/utf8.h"
 
 namespace limn::test {
 namespace {
@@ -47,6 +48,11 @@ fs::path fuzzed_file(const std::uint8_t* bytes, std::size_t size, const std::str
 
 void check_message(const std::string& message, const fs::path& file) {
   LIMN_CHECK(message.find(file.filename().string()) != std::string::npos);
+}
+
+void check_message(const std::string& message) {
+  LIMN_CHECK(message.find("expected") != std::string::npos);
+  LIMN_CHECK(is_utf8(message));
 }
 
 void check_imager(const Imager& imager) {

@@ -17,6 +17,9 @@ std::filesystem::path fuzzed_file(const std::uint8_t* bytes, std::size_t size, c
 /// Checks a message for people: it must name the file. Throws otherwise.
 void check_message(const std::string& message, const std::filesystem::path& file);
 
+/// Checks a message about bytes that are no file: it must say what was expected, in UTF-8. Throws otherwise.
+void check_message(const std::string& message);
+
 /// Checks a reader's answer: a value, or a message that names the file. Throws otherwise.
 template <class Value>
 void check_read(const Result<Value>& read, const std::filesystem::path& file) {

@@ -4,6 +4,7 @@
 
 #include "core/foreign_pose.h"
 #include "exchange/poses/posi_stage_net.h"
+#include "tests/fuzz/fuzz_file.h"
 
 namespace limn::test {
 
@@ -18,5 +19,14 @@ inline void check_poses(const std::vector<ForeignPose>& poses) {
   for (const ForeignPose& pose : poses) check_poses(pose);
 }
 inline void check_poses(const exchange::PsnPacket& packet) { check_poses(packet.poses); }
+
+/// Checks what a decoder answers: such poses, or a message.
+template <class Poses>
+void check_decoded(const Result<Poses>& read) {
+  if (read)
+    check_poses(*read);
+  else
+    check_message(read.message());
+}
 
 }  // namespace limn::test

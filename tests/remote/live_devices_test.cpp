@@ -24,6 +24,7 @@
 #include "session/live_recalibration.h"
 #include "sim/virtual_rig.h"
 #include "tests/remote/remote_client.h"
+#include "tests/support/canvas.h"
 #include "tests/support/clicker.h"
 #include "tests/support/matchers.h"
 #include "tests/support/small_disk.h"
@@ -34,27 +35,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace test::literals;
-
-// Remembers what it was shown; its light leaves 20 ms later.
-class Canvas : public device::Display {
- public:
-  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
-  const std::string& name() const override { return name_; }
-  cv::Size size() const override { return size_; }
-  Result<Stamp> show(const cv::Mat& image) override {
-    if (image.size() != size_) return error("{}: expected its size, found another.", name_);
-    shown = image.clone();
-    ++count;
-    most_lit = std::max(most_lit, cv::countNonZero(image.reshape(1)));
-    return shifted(std::chrono::steady_clock::now(), 0.020);
-  }
-  cv::Mat shown;
-  int count = 0, most_lit = 0;
-
- private:
-  std::string name_;
-  cv::Size size_;
-};
+using test::Canvas;
 
 // A camera that sends JPEG, whose cable is out for a while.
 class LooseCamera : public device::CameraSource {

@@ -1,7 +1,6 @@
 // What the displays of a session on devices show.
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -19,29 +18,14 @@
 #include "session/session.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
+#include "tests/support/canvas.h"
 #include "tests/support/matchers.h"
 
 namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A display that keeps the last shown image.
-class Canvas : public device::Display {
- public:
-  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
-  const std::string& name() const override { return name_; }
-  cv::Size size() const override { return size_; }
-  Result<Stamp> show(const cv::Mat& image) override {
-    shown = image.clone();
-    return shifted(std::chrono::steady_clock::now(), 0.02);
-  }
-  cv::Mat shown;
-
- private:
-  std::string name_;
-  cv::Size size_;
-};
+using test::Canvas;
 
 // Three screens, as in a devices file; the recording has their names.
 TEST(Live, EachScreenShowsWhatWasChosenForIt) {

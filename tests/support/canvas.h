@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+
+#include "device/display.h"
+
+namespace limn::test {
+
+/// A display that remembers what it was shown; its light leaves 20 ms later.
+class Canvas : public device::Display {
+ public:
+  Canvas(std::string name, cv::Size size) : name_(std::move(name)), size_(size) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return size_; }
+  Result<Stamp> show(const cv::Mat& image) override {
+    if (image.size() != size_) return error("{}: expected its size, found another.", name_);
+    shown = image.clone();
+    ++count;
+    most_lit = std::max(most_lit, cv::countNonZero(image.reshape(1)));
+    return shifted(std::chrono::steady_clock::now(), 0.020);
+  }
+  cv::Mat shown;
+  int count = 0;     ///< images shown
+  int most_lit = 0;  ///< the largest number of bytes over 0 in an image
+
+ private:
+  std::string name_;
+  cv::Size size_;
+};
+
+}  // namespace limn::test
