@@ -39,10 +39,11 @@ Result<Events> load_events(const fs::path& path) {
     Json event = Json::parse(line, nullptr, false);
     if (event.is_discarded() || !event.is_object() ||
         !(event.contains("watch") || event.contains("edit") || event.contains("paint") ||
-          event.contains("scene") || event.contains("rig") || event.contains("eye"))) {
-      events.damage =
-          fmt::format("{}:{}: expected an event (watch, edit, eye, scene, rig, paint), found something else",
-                      path.string(), events.all.size() + 1);
+          event.contains("scene") || event.contains("rig") || event.contains("eye") ||
+          event.contains("dark"))) {
+      events.damage = fmt::format(
+          "{}:{}: expected an event (watch, edit, eye, dark, scene, rig, paint), found something else",
+          path.string(), events.all.size() + 1);
       break;
     }
     events.all.push_back(std::move(event));
@@ -163,6 +164,7 @@ class Recording final : public session::FrameClock, public session::FrameSource 
     if (event.contains("rig")) return replace_rig(event.at("rig"));
     if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
     if (event.contains("eye")) replay_tablet(event.at("eye"));
+    if (event.contains("dark")) session_->set_dark_projectors(event.at("dark"));
     return {};
   }
 

@@ -51,6 +51,10 @@ Pose interpolated(const Pose& from, const Pose& to, double t) {
   return boxplus(from, t * boxminus(to, from));
 }
 
+bool is_same(const Pose& a, const Pose& b) {
+  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
+}
+
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b) {
   return log_rotation(a * b.conjugate()).norm();
 }

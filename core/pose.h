@@ -45,6 +45,9 @@ Vector6d boxminus(const Pose& to, const Pose& from);
 /// a straight line. t outside [0, 1] extrapolates.
 Pose interpolated(const Pose& from, const Pose& to, double t);
 
+/// Whether all numbers of both poses are equal.
+bool is_same(const Pose& a, const Pose& b);
+
 /// Angle between two orientations, radians in [0, pi].
 double angle_between(const Eigen::Quaterniond& a, const Eigen::Quaterniond& b);
 

@@ -79,11 +79,9 @@ void ProjectorView::invalidate() {
   for (CachedImage& cached : cached_images_) cached.is_current = false;
 }
 
-// Whether to use half the samples. Only for images in motion; a still image is then drawn once more with all
-// samples. Never with even black: its light begins and ends within a pixel, and the change would be visible.
-bool ProjectorView::is_quick(bool is_still) const {
-  return quick_motion_ && !is_still && !shared_.balance.options().even_black;
-}
+// Whether to use half the samples. Never with even black: its light begins and ends within a pixel, and the
+// change would be visible.
+bool ProjectorView::is_quick() const { return quick_motion_ && !shared_.balance.options().even_black; }
 
 const Smoothing& ProjectorView::smoothing(bool is_quick) const {
   if (shared_.balance.options().even_black) return k_dark_edges;
@@ -114,9 +112,8 @@ void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
 GLuint ProjectorView::draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   LIMN_CHECK(index < cached_images_.size());
   CachedImage& cached = cached_images_[index];
-  const bool is_still = cached.is_valid_for(posed, viewer);
-  if (is_still && !cached.is_quick) return *cached.display.texture;
-  cached.is_quick = is_quick(is_still);
+  if (cached.is_valid_for(posed, viewer) && cached.is_quick == is_quick()) return *cached.display.texture;
+  cached.is_quick = is_quick();
 
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::all);

@@ -74,7 +74,7 @@ class ProjectorView {
 
   explicit ProjectorView(const Shared& shared)
       : shared_(shared), cached_images_(shared.rig.projectors.size()) {}
-  bool is_quick(bool is_still) const;
+  bool is_quick() const;
   const Smoothing& smoothing(bool is_quick) const;
   LightPasses& light_passes();
   void find_places(std::size_t index, const Imager& viewer);

@@ -74,9 +74,8 @@ class Renderer {
   /// Sets the smoothing of composites and views, from the next one on.
   void set_smoothing(const Smoothing& smoothing);
 
-  /// When on, a projector's image that differs from its last one (something moves) is anti-aliased with 4
-  /// samples instead of 8. The first call without a change draws it again with 8. Off by default. Has no
-  /// effect with LightOptions::even_black.
+  /// When on, projectors' images are anti-aliased with 4 samples instead of 8, from the next one on: for
+  /// frames in which something moves. Off by default. Has no effect with LightOptions::even_black.
   void set_quick_motion(bool wanted);
 
   /// Turns on contact shadows: view parts of `scene` (the one given to create) darken the prototype around

@@ -3,27 +3,9 @@
 #include <algorithm>
 
 namespace limn::projector {
-bool is_same(const Pose& a, const Pose& b) {
-  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
-}
-
 bool is_same(const PlacedRun& a, const PlacedRun& b) {
   return a.owner == b.owner && a.run == b.run && is_same(a.scene_from_owner, b.scene_from_owner) &&
          a.material == b.material;
-}
-
-bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b) {
-  if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
-  return !a.world_from_prototype || is_same(*a.world_from_prototype, *b.world_from_prototype);
-}
-
-bool is_same(const scene::PosedScene& a, const scene::PosedScene& b) {
-  return is_same_prototype(a, b) && a.light == b.light &&
-         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
-                    [](const auto& p, const auto& q) {
-                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
-                             is_same(p.world_from_part, q.world_from_part);
-                    });
 }
 
 bool is_same_lens(const Imager& a, const Imager& b) {

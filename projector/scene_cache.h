@@ -15,10 +15,10 @@
 
 namespace limn::projector {
 
-bool is_same(const Pose& a, const Pose& b);
+using limn::is_same;
+using scene::is_same;
+using scene::is_same_prototype;
 bool is_same(const PlacedRun& a, const PlacedRun& b);
-bool is_same_prototype(const scene::PosedScene& a, const scene::PosedScene& b);
-bool is_same(const scene::PosedScene& a, const scene::PosedScene& b);
 /// Whether both have the same size and lens; their poses may differ.
 bool is_same_lens(const Imager& a, const Imager& b);
 

@@ -115,6 +115,20 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
   return out;
 }
 
+bool is_same_prototype(const PosedScene& a, const PosedScene& b) {
+  if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
+  return !a.world_from_prototype || limn::is_same(*a.world_from_prototype, *b.world_from_prototype);
+}
+
+bool is_same(const PosedScene& a, const PosedScene& b) {
+  return is_same_prototype(a, b) && a.light == b.light &&
+         std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
+                    [](const PosedPart& p, const PosedPart& q) {
+                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
+                             limn::is_same(p.world_from_part, q.world_from_part);
+                    });
+}
+
 std::optional<Eigen::Vector3d> middle_of(const Scene& scene, const PosedScene& posed) {
   Eigen::AlignedBox3d box;
   if (scene.prototype && posed.world_from_prototype)

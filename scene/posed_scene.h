@@ -37,6 +37,11 @@ PosedScene posed(const Scene& scene,
                  std::span<const Track> tracks,
                  std::span<const std::string> variants = {});
 
+/// Whether both look the same: the same poses, variants, materials and light, to the last bit.
+bool is_same(const PosedScene& a, const PosedScene& b);
+/// Whether the prototype is at the same pose in both.
+bool is_same_prototype(const PosedScene& a, const PosedScene& b);
+
 /// The point that viewers look at: the middle of the prototype, or of the parts if there is no prototype.
 /// Nullopt when there are no parts either.
 std::optional<Eigen::Vector3d> middle_of(const Scene& scene, const PosedScene& posed);

@@ -68,17 +68,27 @@ class DeviceSink final : public FrameSink {
   Status show(const ComposedFrame&, const std::vector<EyeImages>& light) override {
     clock_->painted_in(1e-3 * session_->measured().paint_ms);
     double latest_s = 0;
+    dark_.clear();
     for (std::size_t i = 0; i < devices_->projectors.size(); ++i) {
       device::Display* display = devices_->projectors[i].get();
-      if (!display) continue;
+      const std::string& name = session_->setup().rig.projectors[i].name;
+      if (!display) {
+        dark_.push_back(name);
+        continue;
+      }
       const Stamp begun = now();
       const Result<Stamp> shown_at = display->show_eyes(light[i]);
       note(projectors_[i], shown_at);
-      if (shown_at) latest_s = std::max(latest_s, seconds_between(begun, *shown_at));
+      if (shown_at)
+        latest_s = std::max(latest_s, seconds_between(begun, *shown_at));
+      else
+        dark_.push_back(name);
     }
     if (latest_s > 0) clock_->displayed_in(latest_s);
     return {};
   }
+
+  std::optional<std::vector<std::string>> dark_projectors() const override { return dark_; }
 
   std::vector<ScreenRequest> wanted_screens() const override {
     std::vector<ScreenRequest> out;
@@ -129,6 +139,7 @@ class DeviceSink final : public FrameSink {
   DeviceHealth* health_;
   DeviceClock* clock_;
   std::vector<std::size_t> projectors_, screens_;  // in health_
+  std::vector<std::string> dark_;                  // projectors that did not show the last frame
 };
 
 cv::Mat DeviceSink::fitted(const cv::Mat& image, cv::Size size) {

@@ -23,6 +23,19 @@ Eigen::AlignedBox3d box_of(const scene::Scene& scene) {
   return box;
 }
 
+// Whether the parts of both give the same light.
+bool has_same_light(const FrameDescription& a, const FrameDescription& b) {
+  const auto is_steady = [](const FrameDescription& frame) {
+    return frame.fading.empty() && frame.gone.empty();
+  };
+  const auto is_same_map = [](const cv::Mat& map, const cv::Mat& other) {
+    return map.size() == other.size() && (map.empty() || cv::norm(map, other, cv::NORM_INF) == 0);
+  };
+  return is_steady(a) && is_steady(b) && scene::is_same(a.posed, b.posed) &&
+         is_same(a.viewer.imager_from_world, b.viewer.imager_from_world) &&
+         std::ranges::equal(a.arriving, b.arriving, is_same_map);
+}
+
 }  // namespace
 
 std::vector<cv::Mat> ComposedFrame::eye_images() const {
@@ -65,131 +78,110 @@ std::vector<LooseMarker> waiting_markers(const scene::Scene& scene,
 Result<FrameComposer> FrameComposer::create(const scene::Scene& scene,
                                             const Rig& rig,
                                             const ComposeOptions& options) {
-  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, rig));
-  return FrameComposer(std::unique_ptr<const Subject>(new Subject{scene, rig, scene::PartBoxes(scene)}),
-                       std::move(renderer), options);
+  std::unique_ptr<const Subject> subject(new Subject{scene, rig, scene::PartBoxes(scene)});
+  LIMN_TRY(FrameDrawer drawer, FrameDrawer::create(&subject->scene, &subject->rig, draw_options(options)));
+  return FrameComposer(std::move(subject), std::move(drawer), options);
 }
 
 FrameComposer::FrameComposer(std::unique_ptr<const Subject> subject,
-                             projector::Renderer renderer,
+                             FrameDrawer drawer,
                              const ComposeOptions& options)
     : subject_(std::move(subject)),
-      renderer_(std::move(renderer)),
+      drawer_(std::move(drawer)),
       options_(options),
-      bodies_(scene::bodies(subject_->scene)),
-      constellations_(scene::constellations(subject_->scene)),
-      has_infrared_(std::ranges::count(subject_->rig.cameras, Spectrum::infrared, &Imager::sees) > 0),
       prototype_box_(box_of(subject_->scene)),
       viewpoints_(&subject_->scene, &subject_->rig),
       fading_(options),
       screens_(&subject_->scene, &subject_->rig, options, prototype_box_, &subject_->part_boxes),
       shadows_(subject_->rig),
       drifts_(subject_->rig) {
-  renderer_.set_quick_motion(true);
   for (const Imager& projector : subject_->rig.projectors)
     composed_.projectors.emplace_back(projector.height, projector.width, CV_8UC3, cv::Scalar::all(0));
   composed_.right_eyes.resize(composed_.projectors.size());
 }
 
 const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
-  composed_.painted_at = input.times.now;
-  composed_.shown_at = input.times.shown_at;
-  const scene::ShowState& show_state = input.show_state;
-  if (show_state.frozen && !show_state.blackout && !is_black_) return composed_;
-  is_black_ = show_state.blackout;
+  describe(input);
+  return draw();
+}
 
-  // Compose: poses of the parts, fades, viewpoint, shadows on the prototype.
-  composed_.tracks = input.tracks;
-  keep_still(fading_.faded().world_from_prototype, prototype_box_, &composed_.tracks);
-  composed_.posed = scene::compose_scene(subject_->scene, show_state, composed_.tracks);
-  keep_parts_still(fading_.faded(), subject_->part_boxes, &composed_.posed);
-  fading_.note(subject_->scene, composed_.posed, show_state, input.times.shown_at);
+const FrameDescription& FrameComposer::describe(const FrameInput& input) {
+  ++frame_.number;
+  frame_.painted_at = composed_.painted_at = input.times.now;
+  frame_.shown_at = composed_.shown_at = input.times.shown_at;
+  const scene::ShowState& show_state = input.show_state;
+  is_held_ = show_state.frozen && !show_state.blackout && !frame_.is_black;
+  if (is_held_) return frame_;
+
+  // Poses of the parts, fades, viewpoint, shadows on the prototype.
+  FrameDescription before = std::move(frame_);
+  frame_ = {.number = before.number, .painted_at = before.painted_at, .shown_at = before.shown_at};
+  frame_.is_black = show_state.blackout;
+  frame_.tracks = input.tracks;
+  keep_still(fading_.faded().world_from_prototype, prototype_box_, &frame_.tracks);
+  frame_.posed = scene::compose_scene(subject_->scene, show_state, frame_.tracks);
+  keep_parts_still(fading_.faded(), subject_->part_boxes, &frame_.posed);
+  fading_.note(subject_->scene, frame_.posed, show_state, input.times.shown_at);
+  frame_.fading = fading_.fading_parts(input.times.shown_at);
+  frame_.gone = fading_.gone_scene(input.times.shown_at);
   select_viewpoint(input);
   if (options_.refill && subject_->rig.projectors.size() > 1)
-    shadows_.update(input.percepts, composed_.posed, shown_, &renderer_);
+    shadows_.update(input.percepts, frame_.posed, shown_, &drawer_.renderer());
+  frame_.arriving = arriving_light(input.dark_projectors);
 
-  draw_projectors(input);
+  for (const LooseMarker& loose : input.percepts.loose) frame_.loose.push_back(loose.marker);
+  frame_.on_surface = surface_overlays(show_state);
+  if (!frame_.is_black) frame_.signs = marker_overlays(input);
+  frame_.is_moving = !has_same_light(before, frame_);
+  return frame_;
+}
+
+const ComposedFrame& FrameComposer::draw() {
+  if (is_held_) return composed_;
+  composed_.tracks = frame_.tracks;
+  composed_.posed = frame_.posed;
+  draw_projectors();
   std::vector<cv::Mat> light;
   for (std::size_t i = 0; i < composed_.projectors.size(); ++i)
     light.push_back(mean_light(composed_.images(i)));
-  shown_.add(light, input.times.shown_at);
+  shown_.add(light, frame_.shown_at);
   return composed_;
 }
 
-// Draws for each eye: parts, overlays on the surface, no light on markers, signs beside markers.
-void FrameComposer::draw_projectors(const FrameInput& input) {
-  const bool is_black = input.show_state.blackout;
-  const std::vector<projector::Overlay> on_surface = surface_overlays(input.show_state);
-  const std::vector<projector::Overlay> signs =
-      is_black ? std::vector<projector::Overlay>() : marker_overlays(input);
-  const std::vector<Body> dark = bodies_without_light(input.percepts);
-  const auto eyes = limn::eyes(composed_.viewer, 1e-3 * options_.stereo_mm);
-  const auto drawn = [&](std::size_t i, const Imager& eye) {
-    const Imager& imager = subject_->rig.projectors[i];
-    if (is_black) return cv::Mat(imager.height, imager.width, CV_8UC3, cv::Scalar::all(0));
-    cv::Mat image = fading_.image(i, eye, composed_.shown_at, &renderer_);
-    draw(on_surface, target(i, eye, &image));
-    image = keep_off_markers(image, i, dark);
-    draw(signs, target(i, eye, &image));
-    return image;
-  };
+// What shadows leave, and nothing from dark projectors.
+std::vector<cv::Mat> FrameComposer::arriving_light(std::span<const std::string> dark_projectors) const {
+  std::vector<cv::Mat> maps = shadows_.maps();
+  for (const std::string& name : dark_projectors) {
+    const Imager* projector = find_named(subject_->rig.projectors, name);
+    if (!projector) continue;
+    maps.resize(subject_->rig.projectors.size());
+    maps[static_cast<std::size_t>(projector - subject_->rig.projectors.data())] =
+        cv::Mat(1, 1, CV_8U, cv::Scalar(0));
+  }
+  return maps;
+}
+
+void FrameComposer::draw_projectors() {
   for (std::size_t i = 0; i < composed_.projectors.size(); ++i) {
-    composed_.projectors[i] = drawn(i, is_stereo(i) ? eyes[0] : composed_.viewer);
-    if (is_stereo(i)) composed_.right_eyes[i] = drawn(i, eyes[1]);
+    const EyeImages images = drawer_.image(frame_, i);
+    composed_.projectors[i] = images.left;
+    composed_.right_eyes[i] = images.right;
   }
 }
 
-bool FrameComposer::is_stereo(std::size_t projector) const {
-  return std::count(options_.stereo_projectors.begin(), options_.stereo_projectors.end(),
-                    subject_->rig.projectors[projector].name) > 0;
-}
-
 void FrameComposer::select_viewpoint(const FrameInput& input) {
-  const SelectedViewpoint& selected = viewpoints_.select(composed_.posed, input);
-  composed_.viewer = selected.viewer;
+  const SelectedViewpoint& selected = viewpoints_.select(frame_.posed, input);
+  frame_.viewer = composed_.viewer = selected.viewer;
   composed_.follows = selected.follows;
   composed_.p_guest_eye_world = selected.p_guest_eye_world;
-}
-
-projector::OverlayTarget FrameComposer::target(std::size_t projector, const Imager& viewer, cv::Mat* image) {
-  return {projector, subject_->rig.projectors[projector], composed_.posed, image, &renderer_, &viewer};
-}
-
-std::vector<Body> FrameComposer::bodies_without_light(const Percepts& percepts) const {
-  std::vector<Body> bodies = bodies_;
-  for (const LooseMarker& loose : percepts.loose)
-    bodies.push_back({scene::loose_body(loose.marker),
-                      {{loose.marker, scene::first_marker_size_m(subject_->scene), Pose()}}});
-  return bodies;
-}
-
-cv::Mat FrameComposer::keep_off_markers(const cv::Mat& image,
-                                        std::size_t projector,
-                                        std::span<const Body> bodies) const {
-  if (options_.marker_light == tracker::MarkerLight::as_is) return image;
-  const std::vector<Track> tracks =
-      has_infrared_
-          ? tracker::seen_in_visible_light(subject_->rig.cameras, bodies, constellations_, composed_.tracks)
-          : composed_.tracks;
-  return tracker::with_marker_light(image, carrier_mask(projector, bodies, tracks), options_.marker_light);
-}
-
-// Where a projector's light falls on markers and balls.
-cv::Mat FrameComposer::carrier_mask(std::size_t projector,
-                                    std::span<const Body> bodies,
-                                    std::span<const Track> tracks) const {
-  const Imager& imager = subject_->rig.projectors[projector];
-  cv::Mat mask = tracker::marker_mask(imager, bodies, tracks);
-  if (!constellations_.empty()) mask |= tracker::ball_mask(imager, constellations_, tracks);
-  return mask;
 }
 
 // The split view (another look left of a line) and the grid.
 std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
   std::vector<projector::Overlay> out;
-  if (!composed_.posed.world_from_prototype || show_state.blackout) return out;
+  if (!frame_.posed.world_from_prototype || show_state.blackout) return out;
   if (const auto left = scene::left_of_split(subject_->scene, show_state))
-    out.push_back(projector::SplitOverlay{scene::compose_scene(subject_->scene, *left, composed_.tracks),
+    out.push_back(projector::SplitOverlay{scene::compose_scene(subject_->scene, *left, frame_.tracks),
                                           prototype_box_.center().x() + 1e-3 * show_state.split_mm});
   if (show_state.grid) out.push_back(projector::GridOverlay{});
   return out;
@@ -199,8 +191,8 @@ std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::Sho
 // variants.
 std::vector<projector::Overlay> FrameComposer::marker_overlays(const FrameInput& input) const {
   std::vector<projector::Overlay> out;
-  const Stamp at = composed_.shown_at;
-  for (const Track& track : composed_.tracks) {
+  const Stamp at = frame_.shown_at;
+  for (const Track& track : frame_.tracks) {
     const std::optional<Stamp> lost_at = fading_.lost_at(track.body);
     const PartFading::Label* label = fading_.label(track.body);
     for (const SignPlace& place : sign_places(track)) {
@@ -234,13 +226,13 @@ std::vector<projector::Overlay> FrameComposer::marker_overlays(const FrameInput&
 // it.
 std::vector<FrameComposer::SignPlace> FrameComposer::sign_places(const Track& track) const {
   std::vector<SignPlace> places;
-  if (const Body* body = find_named(bodies_, track.body))
+  if (const Body* body = find_named(drawer_.bodies(), track.body))
     for (const BodyMarker& marker : body->markers) {
       const Pose world_from_marker = track.world_from_body * marker.body_from_marker;
       if (const auto projector = best_projector(world_from_marker))
         places.push_back({*projector, world_from_marker, marker.size_m});
     }
-  const Constellation* balls = find_named(constellations_, track.body);
+  const Constellation* balls = find_named(drawer_.constellations(), track.body);
   const std::vector<Imager>& projectors = subject_->rig.projectors;
   for (std::size_t i = 0; balls && i < projectors.size(); ++i) {
     const Pose facing(projectors[i].imager_from_world.rotation.inverse(), track.world_from_body.translation);
@@ -266,7 +258,8 @@ std::optional<std::size_t> FrameComposer::best_projector(const Pose& world_from_
 }
 
 void FrameComposer::check_drift(const Percepts& percepts) {
-  drifts_.compare(percepts, composed_.posed, bodies_, constellations_, composed_.tracks, shown_, &renderer_);
+  drifts_.compare(percepts, composed_.posed, drawer_.bodies(), drawer_.constellations(), composed_.tracks,
+                  shown_, &drawer_.renderer());
 }
 
 EyeImages FrameComposer::screen(const Percepts& percepts,
@@ -285,13 +278,13 @@ EyeImages FrameComposer::screen(const Percepts& percepts,
     keep_still(fading_.faded().world_from_prototype, prototype_box_, &cameras.back().tracks);
   }
   return screens_.images({cameras, show_state, viewpoints_.selected().viewer, fading_.faded()}, request,
-                         &renderer_);
+                         &drawer_.renderer());
 }
 
 cv::Mat FrameComposer::free_surface(std::size_t projector) {
-  cv::Mat points = renderer_.surface_points(projector, composed_.posed);
+  cv::Mat points = drawer_.renderer().surface_points(projector, composed_.posed);
   points.setTo(cv::Scalar::all(std::numeric_limits<double>::quiet_NaN()),
-               carrier_mask(projector, bodies_, composed_.tracks));
+               drawer_.carrier_mask(projector, composed_.tracks));
   return points;
 }
 

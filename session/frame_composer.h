@@ -11,10 +11,10 @@
 #include "core/rig.h"
 #include "core/stereo.h"
 #include "projector/overlays/overlays.h"
-#include "projector/renderer.h"
 #include "scene/part_boxes.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/drawing/frame_drawer.h"
 #include "session/drift_watch.h"
 #include "session/frame_input.h"
 #include "session/part_fading.h"
@@ -66,8 +66,13 @@ class FrameComposer {
                                       const Rig& rig,
                                       const ComposeOptions& options = {});
 
-  /// Composes the projectors' images for the moment at which their light arrives. Stamps must not go back.
+  /// Composes the projectors' images for the moment at which their light arrives: describe(), then draw().
+  /// Stamps must not go back.
   const ComposedFrame& compose(const FrameInput& input);
+  /// Decides what the frame shows. Other machines can draw it from the description.
+  const FrameDescription& describe(const FrameInput& input);
+  /// Draws the frame that was described last.
+  const ComposedFrame& draw();
 
   /// Checks by the projected light whether a device has moved, with the frames that compose() used last.
   /// After the prototype has come to rest this takes longer than a frame: call it when the images are shown.
@@ -84,6 +89,8 @@ class FrameComposer {
   /// composed frame, CV_32FC3. NaN where there is none, and on markers.
   cv::Mat free_surface(std::size_t projector);
 
+  /// What the last frame shows.
+  const FrameDescription& description() const { return frame_; }
   /// The last composed frame.
   const ComposedFrame& composed() const { return composed_; }
   /// The device that has moved, if any.
@@ -96,17 +103,12 @@ class FrameComposer {
     Rig rig;
     scene::PartBoxes part_boxes;
   };
-  FrameComposer(std::unique_ptr<const Subject> subject,
-                projector::Renderer renderer,
-                const ComposeOptions& options);
+  FrameComposer(std::unique_ptr<const Subject> subject, FrameDrawer drawer, const ComposeOptions& options);
   void select_viewpoint(const FrameInput& input);
+  std::vector<cv::Mat> arriving_light(std::span<const std::string> dark_projectors) const;
   std::vector<projector::Overlay> surface_overlays(const scene::ShowState& show_state) const;
   std::vector<projector::Overlay> marker_overlays(const FrameInput& input) const;
-  void draw_projectors(const FrameInput& input);
-  cv::Mat keep_off_markers(const cv::Mat& image, std::size_t projector, std::span<const Body> bodies) const;
-  std::vector<Body> bodies_without_light(const Percepts& percepts) const;
-  projector::OverlayTarget target(std::size_t projector, const Imager& viewer, cv::Mat* image);
-  bool is_stereo(std::size_t projector) const;
+  void draw_projectors();
   std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;
   // A place for the signs of a body, in front of one projector.
   struct SignPlace {
@@ -115,16 +117,10 @@ class FrameComposer {
     double size_m = 0;
   };
   std::vector<SignPlace> sign_places(const Track& track) const;
-  cv::Mat carrier_mask(std::size_t projector,
-                       std::span<const Body> bodies,
-                       std::span<const Track> tracks) const;
 
   std::unique_ptr<const Subject> subject_;
-  projector::Renderer renderer_;
+  FrameDrawer drawer_;
   ComposeOptions options_;
-  std::vector<Body> bodies_;
-  std::vector<Constellation> constellations_;
-  bool has_infrared_ = false;          // whether a camera sees no projected light
   Eigen::AlignedBox3d prototype_box_;  // in the prototype's frame
   ViewpointSelector viewpoints_;
   PartFading fading_;
@@ -132,8 +128,9 @@ class FrameComposer {
   ProjectionHistory shown_;
   ShadowWatch shadows_;
   DriftWatch drifts_;
+  FrameDescription frame_;
+  bool is_held_ = false;  // frame_ is frozen; a blackout has priority over that
   ComposedFrame composed_;
-  bool is_black_ = false;  // in a blackout, which has priority over a freeze
 };
 
 }  // namespace limn::session

@@ -2,6 +2,10 @@
 
 namespace limn::session {
 
+DrawOptions draw_options(const ComposeOptions& options) {
+  return {options.marker_light, options.stereo_mm, options.stereo_projectors};
+}
+
 // Perception has already predicted with the filter to captured_at; its tracks are reused.
 std::vector<Track> predicted_at(const Percepts& percepts, const ComposeOptions& options, Stamp at) {
   if (at == percepts.captured_at && options.prediction == tracker::Prediction::filtered)

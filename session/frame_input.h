@@ -8,6 +8,7 @@
 #include "core/frame.h"
 #include "core/track.h"
 #include "scene/show_state.h"
+#include "session/drawing/frame_drawer.h"
 #include "session/perception.h"
 #include "tracker/marker_light.h"
 #include "tracker/predict.h"
@@ -28,6 +29,9 @@ struct ComposeOptions {
   /// The images that screens show are proportional to light; they are converted to sRGB for screens.
   bool is_linear_camera = false;
 };
+
+/// The options that the drawing of a described frame needs.
+DrawOptions draw_options(const ComposeOptions& options);
 
 /// Position of the tablet camera of a guest with a name, found from the tablet's own image; world frame, m.
 struct TabletViewpoint {
@@ -70,6 +74,8 @@ struct FrameInput {
   FrameTimes times;
   std::vector<Track> tracks;  ///< Prediction::at_light, assigned to slots as the show state pairs markers
   std::span<const TabletViewpoint> places = {};  ///< tablets that the viewpoint depends on
+  /// Projectors that give no light now, by name. Others that reach their places give it instead.
+  std::span<const std::string> dark_projectors = {};
 };
 
 /// The tracks at any moment near the last capture.

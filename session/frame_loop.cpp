@@ -43,11 +43,15 @@ Result<bool> FrameLoop::step() {
   LIMN_TRY(const std::optional<FrameTimes> times, setting_.clock.next_frame());
   if (!times) return true;
 
+  if (auto dark = setting_.sink.dark_projectors()) session.set_dark_projectors(std::move(*dark));
+
   // Predict, once: where every body is when this frame's light arrives. Edits of this frame already count.
   const FrameInput input = session.predict(*times);
 
   // Compose and draw the projectors' images (FrameComposer::compose).
-  const ComposedFrame& composed = session.compose(input);
+  const ComposedFrame& composed = session.compose(input, [&](const FrameDescription& frame) {
+    for (SessionClient* client : parts_.clients) client->note_description(frame);
+  });
 
   // Add the clients' overlays to the projected light only.
   const std::vector<EyeImages> light = with_overlays(composed, session.setup().rig, client_overlays());

@@ -66,6 +66,8 @@ class FrameSink {
   /// Shows `light`, one image per projector: the composed images with the clients' overlays. Error: the
   /// session cannot go on.
   virtual Status show(const ComposedFrame& composed, const std::vector<EyeImages>& light) = 0;
+  /// The projectors that give no light now; nullopt: a recording says it.
+  virtual std::optional<std::vector<std::string>> dark_projectors() const { return std::nullopt; }
   /// The screen images that show_screens() needs for this frame.
   virtual std::vector<ScreenRequest> wanted_screens() const { return {}; }
   virtual void show_screens(std::span<const ScreenImages>) {}

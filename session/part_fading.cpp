@@ -1,38 +1,8 @@
 #include "session/part_fading.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 
 namespace limn::session {
-namespace {
-
-constexpr double k_fading_gamma = 2.2;  // accurate enough to mix fading images
-
-// base + share * (with - base), in linear light.
-cv::Mat mixed(const cv::Mat& base, const cv::Mat& with, double share) {
-  std::array<float, 256> light{};
-  for (int i = 0; i < 256; ++i)
-    light[static_cast<std::size_t>(i)] = static_cast<float>(std::pow(i / 255.0, k_fading_gamma));
-  cv::Mat out(base.size(), base.type());
-  const auto bytes = [](const cv::Mat& m, int row) { return m.ptr<std::uint8_t>(row); };
-  for (int row = 0; row < base.rows; ++row) {
-    const std::uint8_t *a = bytes(base, row), *b = bytes(with, row);
-    std::uint8_t* c = out.ptr<std::uint8_t>(row);
-    for (int i = 0; i < 3 * base.cols; ++i) {
-      if (a[i] == b[i]) {
-        c[i] = a[i];
-        continue;
-      }
-      const double sum = light[a[i]] + share * (light[b[i]] - light[a[i]]);
-      c[i] = cv::saturate_cast<std::uint8_t>(255 * std::pow(sum, 1 / k_fading_gamma));
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
 void PartFading::note(const scene::Scene& scene,
                       const scene::PosedScene& posed,
                       const scene::ShowState& show_state,
@@ -71,24 +41,21 @@ void PartFading::note_variants(const scene::Scene& scene, const scene::ShowState
       labels_, [&](const auto& entry) { return seconds_between(entry.second.since, at) > options_.label_s; });
 }
 
-cv::Mat PartFading::image(std::size_t projector,
-                          const Imager& viewer,
-                          Stamp at,
-                          projector::Renderer* renderer) const {
-  cv::Mat image = renderer->projector_image(projector, faded_, viewer);
-  if (gone_) {
-    const double share = 1 - seconds_between(gone_->lost_at, at) / options_.fade_s;
-    return share <= 0 ? image
-                      : mixed(image, renderer->projector_image(projector, gone_->posed, viewer), share);
-  }
-  for (const auto& [slot, fading] : fading_) {
-    const double share = 1 - seconds_between(fading.lost_at, at) / options_.fade_s;
-    if (share <= 0) continue;
-    scene::PosedScene with = faded_;
-    with.parts.push_back(fading.part);
-    image = mixed(image, renderer->projector_image(projector, with, viewer), share);
-  }
-  return image;
+std::vector<FadingPart> PartFading::fading_parts(Stamp at) const {
+  std::vector<FadingPart> out;
+  if (gone_) return out;
+  for (const auto& [slot, fading] : fading_)
+    if (const double share = share_left(fading.lost_at, at); share > 0) out.push_back({fading.part, share});
+  return out;
+}
+
+std::vector<FadingScene> PartFading::gone_scene(Stamp at) const {
+  const double share = gone_ ? share_left(gone_->lost_at, at) : 0;
+  return share > 0 ? std::vector<FadingScene>{{gone_->posed, share}} : std::vector<FadingScene>();
+}
+
+double PartFading::share_left(Stamp lost_at, Stamp at) const {
+  return 1 - seconds_between(lost_at, at) / options_.fade_s;
 }
 
 std::optional<Stamp> PartFading::lost_at(const std::string& slot) const {

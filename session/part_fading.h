@@ -1,15 +1,14 @@
 #pragma once
 
 #include <map>
-#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "core/imager.h"
-#include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
+#include "session/drawing/frame_description.h"
 #include "session/frame_input.h"
 
 namespace limn::session {
@@ -32,8 +31,10 @@ class PartFading {
             const scene::ShowState& show_state,
             Stamp at);
 
-  /// A projector's image of the parts that were noted last, with the parts that are fading mixed in.
-  cv::Mat image(std::size_t projector, const Imager& viewer, Stamp at, projector::Renderer* renderer) const;
+  /// The parts that are fading at that moment; none while the whole scene fades.
+  std::vector<FadingPart> fading_parts(Stamp at) const;
+  /// The whole scene, while it fades because the prototype was lost.
+  std::vector<FadingScene> gone_scene(Stamp at) const;
 
   /// The posed scene that was noted last.
   const scene::PosedScene& faded() const { return faded_; }
@@ -51,6 +52,7 @@ class PartFading {
     scene::PosedScene posed;
     Stamp lost_at;
   };
+  double share_left(Stamp lost_at, Stamp at) const;
   void note_lost(const scene::PosedScene& posed, Stamp at);
   void note_variants(const scene::Scene& scene, const scene::ShowState& show_state, Stamp at);
 

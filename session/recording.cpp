@@ -112,6 +112,13 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
 
 }  // namespace
 
+Status save_setup(const SessionSetup& setup, const fs::path& folder) {
+  LIMN_TRY_STATUS(make_folder(folder));
+  LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
+  LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
+  return write_file(folder / "session.json", json_text(setup_json(setup), 2) + "\n");
+}
+
 Recorder::Recorder(const fs::path& folder) : folder_(folder), images_(k_most_queued) {}
 
 Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const SessionSetup& setup) {
@@ -128,9 +135,7 @@ Result<std::unique_ptr<Recorder>> Recorder::create(const fs::path& folder, const
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::begin(const fs::path& folder, const SessionSetup& setup) {
-  LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
-  LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
+  LIMN_TRY_STATUS(save_setup(setup, folder));
   for (const Imager& camera : setup.rig.cameras)
     LIMN_TRY_STATUS(make_folder(folder / "frames" / camera.name));
   std::unique_ptr<Recorder> out(new Recorder(folder));
@@ -139,7 +144,6 @@ Result<std::unique_ptr<Recorder>> Recorder::begin(const fs::path& folder, const 
     return error(
         "{}: expected a file that can be written, found none. Check the permissions and the free disk space.",
         (folder / "events.jsonl").string());
-  LIMN_TRY_STATUS(write_file(folder / "session.json", json_text(setup_json(setup), 2) + "\n"));
   return out;
 }
 
@@ -198,6 +202,12 @@ void Recorder::record_tablet(const std::string& guest,
   nlohmann::ordered_json eye = {{"guest", guest}, {"at_ns", nanoseconds(at)}};
   if (p_eye_world) eye["p_world"] = {p_eye_world->x(), p_eye_world->y(), p_eye_world->z()};
   write({{"eye", eye}});
+}
+
+void Recorder::record_dark_projectors(const std::vector<std::string>& names) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  write({{"dark", names}});
 }
 
 void Recorder::record_images(const ComposedFrame& composed, std::size_t moments) {

@@ -28,6 +28,9 @@ struct SessionSetup {
   std::vector<std::string> screens = {};  ///< names of the displays that are not projectors
 };
 
+/// Writes rig/, scene/ and session.json, which load_setup() reads. Error: the folder cannot be written.
+Status save_setup(const SessionSetup& setup, const std::filesystem::path& folder);
+
 /// Writes the recording of a session (limn.session/1): the rig and the scene as they were at its start; the
 /// camera frames, as the camera's own JPEG or else as PNG; and events.jsonl, which lists what happened in its
 /// order: perceived frames, edits, positions of tablets that the viewpoint depends on, and composed frames
@@ -53,6 +56,8 @@ class Recorder {
   /// Records the position (world frame, m) of a guest's tablet that the viewpoint depends on; nullopt: it has
   /// none any more.
   void record_tablet(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
+  /// Records which projectors give no light from now on.
+  void record_dark_projectors(const std::vector<std::string>& names);
   /// Records a composed frame. `moments`: as in edited().
   void record_images(const ComposedFrame& composed, std::size_t moments);
 

@@ -10,8 +10,15 @@ constexpr double k_renew_every_s = 1;
 RecoveringComposer::RecoveringComposer(FrameComposer composer)
     : composer_(std::move(composer)), composed_(composer_->composed()) {}
 
-std::optional<std::string> RecoveringComposer::compose(const FrameInput& input, const SessionSetup& setup) {
-  if (composer_) composer_->compose(input);
+std::optional<std::string> RecoveringComposer::compose(
+    const FrameInput& input,
+    const SessionSetup& setup,
+    const std::function<void(const FrameDescription&)>& listener) {
+  if (composer_) {
+    const FrameDescription& frame = composer_->describe(input);
+    if (listener) listener(frame);
+    composer_->draw();
+  }
   if (!composer_ || (drawing_.is_lost && drawing_.is_lost())) return compose_anew(input, setup);
   composed_ = composer_->composed();
   return std::nullopt;

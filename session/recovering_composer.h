@@ -26,8 +26,11 @@ class RecoveringComposer {
   /// Without this call a lost context is not noticed.
   void survive_losses(Drawing drawing) { drawing_ = std::move(drawing); }
 
-  /// `setup`: what a composer in a new context is created for. Returns a message for people, if there is one.
-  std::optional<std::string> compose(const FrameInput& input, const SessionSetup& setup);
+  /// `setup`: what a composer in a new context is created for. `listener` gets the description before it is
+  /// drawn. Returns a message for people, if there is one.
+  std::optional<std::string> compose(const FrameInput& input,
+                                     const SessionSetup& setup,
+                                     const std::function<void(const FrameDescription&)>& listener);
   /// The last composed frame.
   const ComposedFrame& composed() const { return composed_; }
 

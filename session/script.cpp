@@ -21,10 +21,6 @@ constexpr double k_hand_above_m = 0.006;
 // A hand in a projector's light: its place as a share of the way to the prototype's middle, and its size.
 constexpr double k_block_at = 0.6, k_block_width_m = 0.09, k_block_height_m = 0.18;
 
-bool is_same(const Pose& a, const Pose& b) {
-  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
-}
-
 double time_of(const ConfigNode& node) {
   const double seconds = node.number();
   if (seconds < 0) node.problem(fmt::format("expected seconds (0 or more), found {}.", seconds));

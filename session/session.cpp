@@ -115,6 +115,12 @@ void Session::note_tablet(const std::string& guest,
   if (recorder_) recorder_->record_tablet(guest, p_eye_world, at);
 }
 
+void Session::set_dark_projectors(std::vector<std::string> names) {
+  if (names == dark_projectors_) return;
+  dark_projectors_ = std::move(names);
+  if (recorder_) recorder_->record_dark_projectors(dark_projectors_);
+}
+
 Status Session::replace_scene(scene::Scene scene, Stamp at) {
   LIMN_TRY_STATUS(check_same_markers(setup_.scene, scene));
   LIMN_TRY(FrameComposer composer, FrameComposer::create(scene, setup_.rig, setup_.paint));
@@ -158,13 +164,17 @@ void Session::report_skipped(std::span<const scene::SkippedVariant> skipped_vari
 
 FrameInput Session::predict(const FrameTimes& times) {
   prediction_.at_light = predicted_at_light(percepts_, setup_.paint, times);
-  return {percepts_, show_state_, times,
-          scene::assign_tracks(setup_.scene, show_state_, prediction_.at_light), tablets_.places()};
+  return {percepts_,
+          show_state_,
+          times,
+          scene::assign_tracks(setup_.scene, show_state_, prediction_.at_light),
+          tablets_.places(),
+          dark_projectors_};
 }
 
-const ComposedFrame& Session::compose(const FrameInput& input) {
+const ComposedFrame& Session::compose(const FrameInput& input, const DescriptionListener& listener) {
   const auto begun = std::chrono::steady_clock::now();
-  if (const auto message = composer_.compose(input, setup_)) warn(input.times.now, *message);
+  if (const auto message = composer_.compose(input, setup_, listener)) warn(input.times.now, *message);
   paint_ms_ = milliseconds_since(begun);
   return composed();
 }

@@ -66,6 +66,9 @@ class Session {
   /// depends on it while ShowState::viewer names the guest, or the guest is among the scene's viewers.
   void note_tablet(const std::string& guest, const std::optional<Eigen::Vector3d>& p_eye_world, Stamp at);
 
+  /// Projectors that give no light from now on because they are missing or fail, by name.
+  void set_dark_projectors(std::vector<std::string> names);
+
   /// Shows another scene from now on, with the same markers and controls, but with parts that were edited,
   /// added or removed. A new variant is shown at once. Error, and nothing changes: markers or controls
   /// differ, or the scene cannot be drawn.
@@ -93,8 +96,10 @@ class Session {
 
   /// The input for the frame with these times. Bodies are predicted to them here and nowhere else.
   FrameInput predict(const FrameTimes& times);
-  /// Composes the projectors' images of a frame.
-  const ComposedFrame& compose(const FrameInput& input);
+  /// Called with what a frame shows before it is drawn.
+  using DescriptionListener = std::function<void(const FrameDescription&)>;
+  /// Composes the projectors' images of a frame. `listener` may be empty.
+  const ComposedFrame& compose(const FrameInput& input, const DescriptionListener& listener = {});
   /// Adds the composed frame to the recording, if there is one.
   void record_frame();
   /// predict(), compose() and record_frame() in one call, for callers that show nothing.
@@ -152,6 +157,7 @@ class Session {
   std::string pace_;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;
+  std::vector<std::string> dark_projectors_;
   TabletRegistry tablets_;
   double paint_ms_ = 0, record_ms_ = 0;
 };

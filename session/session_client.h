@@ -32,6 +32,8 @@ class SessionClient {
   /// what has changed.
   virtual void publish_state(const SessionMoment& moment) = 0;
 
+  /// Called with what a frame shows, before it is drawn here: other machines can draw it at the same time.
+  virtual void note_description(const FrameDescription&) {}
   /// Overlays for the projected light only: recorded and reported images are without them.
   virtual std::vector<projector::Overlay> overlays(Session*) { return {}; }
   /// Whether the next publish_state() needs an image of the screen.

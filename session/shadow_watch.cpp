@@ -1,6 +1,7 @@
 #include "session/shadow_watch.h"
 
 #include <algorithm>
+#include <opencv2/core.hpp>
 
 #include "session/stillness.h"
 
@@ -33,7 +34,13 @@ void ShadowWatch::update(const Percepts& percepts,
       has_changed |= arriving_.update_maps(i, frame.image, *images);
   }
   if (!has_changed) return;
-  for (std::size_t i = 0; i < rig_.projectors.size(); ++i) renderer->set_occlusion(i, arriving_.map(i));
+  maps_.resize(rig_.projectors.size());
+  for (std::size_t i = 0; i < maps_.size(); ++i) {
+    const cv::Mat& share = arriving_.map(i);
+    const bool is_all = cv::countNonZero(share < 1 - 0.5 / 255) == 0;
+    maps_[i] = cv::Mat();
+    if (!is_all) share.convertTo(maps_[i], CV_8U, 255);
+  }
 }
 
 }  // namespace limn::session

@@ -307,6 +307,13 @@ class VirtualSink final : public FrameSink {
     return {};
   }
 
+  std::optional<std::vector<std::string>> dark_projectors() const override {
+    std::vector<std::string> out;
+    for (const Imager& projector : session_->setup().rig.projectors)
+      if (!room_->script().is_plugged(projector.name, seconds_of(rig_->now()))) out.push_back(projector.name);
+    return out;
+  }
+
   double screen_interval_s() const override { return control_ ? control_->effort().screen_interval_s : 0; }
 
   double placement_mm(const ComposedFrame& composed) const override {

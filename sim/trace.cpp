@@ -59,10 +59,6 @@ Ball ball_of(const Object& object) {
           0.5F * static_cast<float>(box.diagonal().norm())};
 }
 
-bool is_same(const Pose& a, const Pose& b) {
-  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
-}
-
 bool is_same_imager(const Imager& a, const Imager& b) {
   return a.name == b.name && a.width == b.width && a.height == b.height && a.lens.model == b.lens.model &&
          a.lens.values == b.lens.values && is_same(a.imager_from_world, b.imager_from_world) &&

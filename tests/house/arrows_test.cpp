@@ -22,7 +22,8 @@ namespace {
 namespace fs = std::filesystem;
 using Names = std::set<std::string>;
 
-// Each room and the rooms that it may include. exchange/poses and exchange/printing count as rooms.
+// Each room and the rooms that it may include. Folders with a library of their own (exchange/poses) count as
+// rooms.
 const std::map<std::string, Names>& allowed() {
   static const Names k_libraries = {"core", "scene", "device", "calib", "tracker", "projector", "sim"};
   static const auto with = [](const Names& more) {
@@ -44,8 +45,9 @@ const std::map<std::string, Names>& allowed() {
       {"exchange/printing", {"core", "calib", "tracker"}},
       {"design", {"core", "calib", "tracker"}},
       {"wizard", with({"gui"})},
-      {"session", with({"gui", "exchange/poses", "wizard"})},
-      {"remote", with({"gui", "session"})},
+      {"session/drawing", {"core", "scene", "tracker", "projector"}},
+      {"session", with({"gui", "exchange/poses", "wizard", "session/drawing"})},
+      {"remote", with({"gui", "session", "session/drawing"})},
       {"validate", with({"wizard", "session"})},
       {"apps",
        with({"gui", "exchange", "exchange/printing", "design", "wizard", "session", "remote", "validate"})},
