@@ -14,6 +14,7 @@
 #include "core/log.h"
 #include "core/print.h"
 #include "device/devices_file.h"
+#include "nodes/remote_devices.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_folder.h"
 #include "wizard/capture/capture_plan.h"
@@ -195,7 +196,14 @@ Status calibrate_devices(const CalibrateOptions& options) {
     return usage_error("--board: {}", board.message());
   LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, desktop));
+  const device::Desktop* const there = desktop ? &*desktop : nullptr;
+  std::unique_ptr<nodes::Room> room;
+  std::unique_ptr<device::DeviceOpener> opener = std::make_unique<device::LocalOpener>(there);
+  if (!options.room.room.empty()) {
+    LIMN_TRY(room, enter_room_for_orders(options.room));
+    opener = std::make_unique<nodes::RoomOpener>(room.get(), there);
+  }
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, opener.get()));
   return calibrate_on(options, std::move(devices), desktop);
 }
 

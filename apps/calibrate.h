@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "apps/room.h"
 #include "calib/code/patterns.h"
 #include "core/result.h"
 #include "device/desktop.h"
@@ -13,6 +14,7 @@ namespace limn::apps {
 struct CalibrateOptions {
   std::filesystem::path plan = {};                     ///< Plan of a virtual rig (limn.plan/1).
   std::filesystem::path devices = {};                  ///< limn.devices/1, instead of a plan.
+  RoomOptions room = {};                               ///< With devices: whose nodes have some of them.
   std::string board = {};                              ///< With devices: `charuco:11x8:25mm`.
   calib::PatternCode code = calib::PatternCode::gray;  ///< With devices.
   std::string board_measured = {};                     ///< The print's measured size, as for limn solve.

@@ -33,6 +33,7 @@
 #include "apps/recheck.h"
 #include "apps/render.h"
 #include "apps/replay.h"
+#include "apps/room.h"
 #include "apps/scan.h"
 #include "apps/simulate.h"
 #include "apps/solve.h"
@@ -473,6 +474,17 @@ void add_solve(CLI::App& app, Run& run) {
       [options, json, &run] { run = [options, json] { return report_result(run_solve(*options, *json)); }; });
 }
 
+// How a command enters a room, beside the room's name.
+void add_room_options(CLI::App* command, RoomOptions* options) {
+  command->add_option("--name", options->name,
+                      "This machine's name in the room; without it the machine's own");
+  command->add_option(
+      "--peer", options->peers,
+      "Address of another machine of the room, for networks without multicast; may be repeated");
+  command->add_option("--interface", options->interfaces,
+                      "Network interface to use; may be repeated; without it all that work");
+}
+
 void add_calibrate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand(
       "calibrate",
@@ -505,6 +517,10 @@ void add_calibrate(CLI::App& app, Run& run) {
           "--scene", options->scene,
           "Scene whose CAD mesh is aligned to the scan; with --plan the default is the scene of its world")
       ->check(CLI::ExistingPath);
+  command->add_option(
+      "--room", options->room.room,
+      "Name or folder of a room: devices with host in the devices file are at its other machines");
+  add_room_options(command, &options->room);
   add_board_measured(command, &options->board_measured);
   command->add_option("--out", options->out, "Rig folder to write; it also keeps the captures")->required();
   command->add_flag("!--no-scan", options->scan, "Stop after the rig and do not scan the prototype");
@@ -895,6 +911,10 @@ void add_live(CLI::App& app, Run& run) {
       "--poses-out", options->poses_out,
       "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
       "freed or json; may be repeated");
+  command->add_option(
+      "--room", options->room.room,
+      "Name or folder of a room: devices with host in the devices file are at its other machines");
+  add_room_options(command, &options->room);
   command->add_option("--serve", options->serve,
                       "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
                       "machine only, a network address is encrypted");
@@ -914,6 +934,36 @@ void add_live(CLI::App& app, Run& run) {
         options->window || !options->serve.empty() || !options->osc.empty() || !options->trackers.empty();
     run = [options] { return report_result(run_live(*options)); };
   });
+}
+
+void add_room(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand("room", "Make the keys of a room of several machines");
+  command->footer("Example: limn room create studio   (docs/rooms.md)");
+  command->require_subcommand(1);
+  auto* create = command->add_subcommand(
+      "create",
+      "Make a room: keys that machines need to work together. Copy its folder to the other machines");
+  auto name = std::make_shared<std::string>();
+  auto folder = std::make_shared<std::filesystem::path>();
+  create->add_option("name", *name, "The room's name")->required();
+  create->add_option("--out", *folder, "Folder for the keys; without it ~/.config/limn/rooms/NAME");
+  create->callback(
+      [name, folder, &run] { run = [=] { return report_result(create_room(*name, *folder)); }; });
+}
+
+void add_node(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand(
+      "node", "Lend this machine's monitors and cameras to a room, and light its projectors");
+  command->footer(
+      "Ctrl+C or a TERM signal ends it; its projectors become black. Without a host it waits for one.\n"
+      "Example: limn node --join studio   (docs/rooms.md)");
+  auto options = std::make_shared<NodeCommand>();
+  command->add_option("--join", options->room.room, "Name or folder of the room (limn room create)")
+      ->required();
+  add_room_options(command, &options->room);
+  command->add_option("--out", options->out,
+                      "Folder for shown.csv: when each image was shown, and its fingerprint");
+  command->callback([options, &run] { run = [options] { return report_result(run_node(*options)); }; });
 }
 
 void add_replay(CLI::App& app, Run& run) {
@@ -962,8 +1012,11 @@ void add_doctor(CLI::App& app, Run& run) {
       "Exits with 1 when a device that is connected, or that the devices file or --show asks for, does not "
       "work.\n"
       "Example: limn doctor --show 10\n"
-      "Example: limn doctor --devices config/devices/studio.json --rig rig");
+      "Example: limn doctor --devices config/devices/studio.json --rig rig\n"
+      "Example: limn doctor --room studio");
   auto options = std::make_shared<DoctorOptions>();
+  command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed");
+  add_room_options(command, &options->room);
   auto* devices = command->add_option("--devices", options->devices, "Devices file (limn.devices/1) to test");
   command->add_option("--rig", options->rig, "Rig folder; the devices must have its names and sizes")
       ->needs(devices);
@@ -1031,6 +1084,8 @@ int run_arguments(int argc, char** argv) {
   add_import(app, run);
   add_check(app, run);
   add_live(app, run);
+  add_room(app, run);
+  add_node(app, run);
   add_replay(app, run);
   add_simulate(app, run);
   add_doctor(app, run);

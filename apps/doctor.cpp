@@ -12,6 +12,7 @@
 #include <sstream>
 #include <thread>
 
+#include "apps/doctor_room.h"
 #include "core/file.h"
 #include "core/json_text.h"
 #include "core/log.h"
@@ -261,6 +262,17 @@ Result<device::Devices> wanted_devices(const DoctorOptions& options) {
   return device::matched(devices, rig);
 }
 
+// Takes the devices of other machines out of the list.
+template <class Config>
+void note_remote(std::vector<Config>* devices, Findings* findings) {
+  for (const Config& device : *devices)
+    if (!device.host.empty())
+      findings->push_back(
+          {"devices", device.name, State::note,
+           fmt::format("is plugged into the machine {}; --room lists the machines", device.host), ""});
+  std::erase_if(*devices, [](const Config& device) { return !device.host.empty(); });
+}
+
 const char* word(State state) {
   return state == State::works ? "works" : state == State::fails ? "does not" : "note";
 }
@@ -292,7 +304,9 @@ std::vector<Finding> examined(const DoctorOptions& options) {
   Findings findings = {packages(options), clock_of_session(), gl()};
   auto devices = wanted_devices(options);
   if (!devices) findings.push_back(failed("devices", "file", devices.message()));
-  const device::Devices wanted = devices ? *devices : device::Devices{};
+  device::Devices wanted = devices ? *devices : device::Devices{};
+  note_remote(&wanted.cameras, &findings);
+  note_remote(&wanted.displays, &findings);
   const bool desktop_asked_for =
       (options.devices.empty() && options.show_s > 0) ||
       std::any_of(wanted.displays.begin(), wanted.displays.end(), device::needs_desktop);
@@ -301,6 +315,7 @@ std::vector<Finding> examined(const DoctorOptions& options) {
   add(&findings, cameras(wanted));
   for (const device::CameraConfig& camera : wanted.cameras) findings.push_back(tested("devices", camera));
   add(&findings, signs(options, wanted, desktop));
+  if (!options.room.room.empty()) add(&findings, examined_room(options.room));
   return findings;
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/room.h"
 #include "core/result.h"
 
 namespace limn::apps {
@@ -13,6 +14,7 @@ struct DoctorOptions {
   std::filesystem::path devices = {};
   std::filesystem::path rig = {};  ///< Rig that the devices must match.
   double show_s = 0;               ///< How long each output shows its own number and colour.
+  RoomOptions room = {};           ///< A room whose machines are listed.
   bool json = false;               ///< Prints JSON instead of lines.
   /// List of the packages needed, and Debian's own file of installed packages.
   std::filesystem::path packages = {};
@@ -22,7 +24,7 @@ struct DoctorOptions {
 /// The result of one test.
 struct Finding {
   enum class State { works, fails, note };  ///< A note is about something that was not asked for.
-  std::string area;                         ///< packages, clock, gl, displays, cameras or devices
+  std::string area;                         ///< packages, clock, gl, displays, cameras, devices or room
   std::string name;
   State state = State::works;
   std::string text;

@@ -16,10 +16,10 @@
 #include "core/screen_encoding.h"
 #include "core/user_folder.h"
 #include "device/desktop.h"
+#include "device/device_opener.h"
 #include "device/devices_file.h"
 #include "device/gl_context.h"
-#include "device/open_camera.h"
-#include "device/open_display.h"
+#include "nodes/remote_devices.h"
 #include "remote/server.h"
 #include "remote/tablet/tablet_view.h"
 #include "session/device_session.h"
@@ -77,6 +77,10 @@ Status check_options(const LiveOptions& options) {
   if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
     return usage_error(
         "--devices: expected no --world and no --script with it, because they are for the virtual rig.");
+  if (!options.room.room.empty() && options.devices.empty())
+    return usage_error(
+        "--room: expected --devices with it, a file that says which devices are plugged into which machine, "
+        "found none.");
   if (!options.serve_show.empty() && options.serve.empty())
     return usage_error("--serve-show: expected --serve with it, found none.");
   if (options.rig.empty() != options.scene.empty())
@@ -205,11 +209,12 @@ session::Session::Drawing drawing_in(std::optional<device::GlContext>* context) 
 }
 
 // Opens everything that sessions on devices and on the virtual rig have in common, calls `play`, and closes
-// it. `setup` becomes what a replay will read.
+// it. `setup` becomes what a replay will read. `room` may be null.
 Status run_session(const LiveOptions& options,
                    session::SessionSetup setup,
                    std::span<const scene::SkippedVariant> skipped_variants,
                    const device::Desktop* desktop,
+                   session::SessionClient* room,
                    const std::function<Status(const session::SessionParts&, session::Keys*)>& play) {
   std::optional<device::GlContext> context;
   LIMN_TRY(context, device::GlContext::create());
@@ -237,6 +242,7 @@ Status run_session(const LiveOptions& options,
   session::SessionParts parts{perception, session, output, {&osc, &sender}, feeds.get()};
   if (server) parts.clients.push_back(server.get());
   if (console) parts.clients.push_back(&*console);
+  if (room) parts.clients.push_back(room);
   LIMN_TRY_STATUS(play(parts, console ? &console->keys() : nullptr));
   console.reset();
   if (server) server->stop();
@@ -270,7 +276,7 @@ Status play_in_virtual_room(const LiveOptions& options) {
   if (options.window) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
-  return run_session(options, setup, loaded.skipped_variants, desktop ? &*desktop : nullptr,
+  return run_session(options, setup, loaded.skipped_variants, desktop ? &*desktop : nullptr, nullptr,
                      [&](const session::SessionParts& parts, session::Keys*) {
                        return session::play_virtually(end_s, options.is_real_time ? &real_time : nullptr,
                                                       g_is_ended, &rig, &room, parts);
@@ -282,9 +288,7 @@ bool is_projector(const Rig& rig, const std::string& display) {
 }
 
 // Opens the devices. Those that cannot be opened are reported and left out.
-session::SessionDevices opened(const device::Devices& devices,
-                               const Rig& rig,
-                               const device::Desktop* desktop) {
+session::SessionDevices opened(const device::Devices& devices, const Rig& rig, device::DeviceOpener* opener) {
   session::SessionDevices out;
   const auto miss = [&out](const std::string& name, const char* kind, const std::string& why) {
     log_warning("live: {}: {} The session continues without it.", name, why);
@@ -292,13 +296,13 @@ session::SessionDevices opened(const device::Devices& devices,
   };
   for (device::CameraConfig wanted : devices.cameras) {
     wanted.limit_s = k_camera_limit_s;
-    auto camera = device::open_camera(wanted);
+    auto camera = opener->camera(wanted);
     if (!camera) miss(wanted.name, "camera", camera.message());
     out.cameras.push_back(camera ? std::move(*camera) : nullptr);
   }
   out.projectors.resize(rig.projectors.size());
   for (const device::DisplayConfig& wanted : devices.displays) {
-    auto display = device::open_display(wanted, desktop);
+    auto display = opener->display(wanted);
     const Imager* projector = find_named(rig.projectors, wanted.name);
     if (!display) miss(wanted.name, projector ? "projector" : "screen", display.message());
     auto opened = display ? std::move(*display) : nullptr;
@@ -313,6 +317,11 @@ session::SessionDevices opened(const device::Devices& devices,
     keys ? out.keys.push_back(std::move(*keys)) : miss(wanted.name, "keys", keys.message());
   }
   return out;
+}
+
+std::unique_ptr<device::DeviceOpener> opener_for(HostedRoom* room, const device::Desktop* desktop) {
+  if (room) return std::make_unique<nodes::RoomOpener>(room->room(), desktop);
+  return std::make_unique<device::LocalOpener>(desktop);
 }
 
 Status play_with_devices(const LiveOptions& options) {
@@ -338,8 +347,14 @@ Status play_with_devices(const LiveOptions& options) {
       std::any_of(devices.displays.begin(), devices.displays.end(), device::needs_desktop)) {
     LIMN_TRY(desktop, device::Desktop::open());
   }
-  session::SessionDevices open = opened(devices, setup.rig, desktop ? &*desktop : nullptr);
+  std::unique_ptr<HostedRoom> room;
+  if (!options.room.room.empty()) {
+    LIMN_TRY(room, HostedRoom::open(options.room, devices, options.out, &setup));
+  }
+  const std::unique_ptr<device::DeviceOpener> opener = opener_for(room.get(), desktop ? &*desktop : nullptr);
+  session::SessionDevices open = opened(devices, setup.rig, opener.get());
   return run_session(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
+                     room ? room->client() : nullptr,
                      [&](const session::SessionParts& parts, session::Keys* keys) {
                        open.chosen = keys;
                        return session::play_on_devices(&open, options.seconds, g_is_ended, parts);

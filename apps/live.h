@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "apps/room.h"
 #include "core/result.h"
 #include "tracker/balls/constellation_filter.h"
 #include "tracker/marker_light.h"
@@ -40,6 +41,7 @@ struct LiveOptions {
   std::vector<std::string> poses_out;  ///< PROTOCOL:HOST:PORT each, to which poses are sent.
   std::string serve;                   ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none.
   std::string serve_show;              ///< Projector that shows the remote's code at first; empty: none.
+  RoomOptions room;                    ///< With devices: the room whose nodes have some of them.
   bool json = false;
 };
 

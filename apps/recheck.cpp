@@ -55,7 +55,8 @@ Status capture_with_devices(const RecheckCommand& command, const fs::path& folde
   LIMN_TRY(const device::Devices all, device::load_devices(command.devices));
   LIMN_TRY(const device::Devices named, device::matched(all, rig));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, desktop));
+  device::LocalOpener opener(desktop ? &*desktop : nullptr);
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, &opener));
   LIMN_TRY(const calib::Board board, wizard::calibration_board(rig));
   const calib::CaptureSet captures = calib::plan_captures(
       folder, wizard::captured_devices(devices.cameras, devices.infrared),

@@ -249,11 +249,17 @@ void ConfigNode::only(const std::set<std::string>& known) const {
 
 Result<Config> Config::load(const std::filesystem::path& path, const std::string& schema) {
   LIMN_TRY(const std::string text, read_file(path));
+  return parse(text, path, schema);
+}
+
+Result<Config> Config::parse(const std::string& text,
+                             const std::filesystem::path& path,
+                             const std::string& schema) {
   auto file = std::make_shared<ConfigNode::File>();
   file->path = path;
   std::optional<std::string> unsound;
   try {
-    file->json = parse(text, &unsound);
+    file->json = limn::parse(text, &unsound);
   } catch (const Json::parse_error& problem) {
     const auto end = text.begin() + static_cast<std::ptrdiff_t>(std::min(problem.byte, text.size()));
     return error(

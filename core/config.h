@@ -84,6 +84,10 @@ class Config {
  public:
   /// `schema` such as "limn.scene/1"; empty accepts files without one (POSES.json, VIEWER.json).
   static Result<Config> load(const std::filesystem::path& path, const std::string& schema);
+  /// The same for a file's text. `path` names it in messages.
+  static Result<Config> parse(const std::string& text,
+                              const std::filesystem::path& path,
+                              const std::string& schema);
   ConfigNode root() const;
   /// The first recorded problem, if any.
   Status status() const;

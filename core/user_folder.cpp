@@ -5,14 +5,22 @@
 namespace limn {
 
 namespace fs = std::filesystem;
+namespace {
 
-Result<fs::path> user_folder() {
-  const char* config = std::getenv("XDG_CONFIG_HOME");
-  if (config && fs::path(config).is_absolute()) return fs::path(config) / "limn";
+// The folder that a variable names, else one in the home folder.
+Result<fs::path> folder_of(const char* variable, const char* in_home) {
+  const char* named = std::getenv(variable);
+  if (named && fs::path(named).is_absolute()) return fs::path(named) / "limn";
   const char* home = std::getenv("HOME");
-  if (home && *home) return fs::path(home) / ".config" / "limn";
-  return error(
-      "expected a folder for Limn's own files, found neither XDG_CONFIG_HOME nor HOME. Set one of them.");
+  if (home && *home) return fs::path(home) / in_home / "limn";
+  return error("expected a folder for Limn's own files, found neither {} nor HOME. Set one of them.",
+               variable);
 }
+
+}  // namespace
+
+Result<fs::path> user_folder() { return folder_of("XDG_CONFIG_HOME", ".config"); }
+
+Result<fs::path> user_cache_folder() { return folder_of("XDG_CACHE_HOME", ".cache"); }
 
 }  // namespace limn

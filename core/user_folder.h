@@ -10,4 +10,8 @@ namespace limn {
 /// XDG_CONFIG_HOME nor HOME is set.
 Result<std::filesystem::path> user_folder();
 
+/// The folder for files that may be deleted at any time: $XDG_CACHE_HOME/limn, else ~/.cache/limn. Error:
+/// neither XDG_CACHE_HOME nor HOME is set.
+Result<std::filesystem::path> user_cache_folder();
+
 }  // namespace limn

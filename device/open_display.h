@@ -23,6 +23,7 @@ inline constexpr EnumNames<DisplayKind, 3> k_display_kinds{{"monitor", "window",
 /// The configuration of a display.
 struct DisplayConfig {
   std::string name = "projector0";
+  std::string host = {};  ///< The machine of the room that it is plugged into; empty: this one.
   DisplayKind kind = DisplayKind::monitor;
   std::string monitor = {};  ///< The monitor's name on the desktop; other kinds have none.
   cv::Size size = {};        ///< Size of the images, the rig's. Empty, for a monitor only: its present mode.

@@ -249,7 +249,17 @@ Result<std::optional<Pair>> read_pair(const fs::path& path) {
   return std::optional(std::move(found));
 }
 
+Certificate certificate_of(const Pair& own, const Pair& authority) {
+  X509* signer = authority.certificate.get();
+  return {pem_of(own, signer), fingerprint_of(own.certificate.get()), der_of(signer), fingerprint_of(signer)};
+}
+
 }  // namespace
+
+Certificate make_certificate(const std::vector<std::string>& hosts) {
+  const Pair authority = make_authority(hosts);
+  return certificate_of(make_server_pair(authority, hosts), authority);
+}
 
 Result<Certificate> load_or_create_certificate(const fs::path& folder,
                                                const std::vector<std::string>& hosts) {
@@ -269,9 +279,7 @@ Result<Certificate> load_or_create_certificate(const fs::path& folder,
     }
     LIMN_TRY_STATUS(write_secret(folder / k_file, pem_of(*own)));
   }
-  X509* signer = authority->certificate.get();
-  return Certificate{pem_of(*own, signer), fingerprint_of(own->certificate.get()), der_of(signer),
-                     fingerprint_of(signer)};
+  return certificate_of(*own, *authority);
 }
 
 }  // namespace limn::remote

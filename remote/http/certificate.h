@@ -30,4 +30,8 @@ struct Certificate {
 Result<Certificate> load_or_create_certificate(const std::filesystem::path& folder,
                                                const std::vector<std::string>& hosts);
 
+/// A certificate and an authority that exist in memory alone, for clients that get the fingerprint in another
+/// way.
+Certificate make_certificate(const std::vector<std::string>& hosts);
+
 }  // namespace limn::remote

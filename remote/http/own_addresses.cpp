@@ -40,7 +40,7 @@ bool is_unspecified(const std::string& address) {
   return inet_pton(AF_INET6, address.c_str(), &six) == 1 && IN6_IS_ADDR_UNSPECIFIED(&six);
 }
 
-std::vector<std::string> own_addresses() {
+std::vector<std::string> own_addresses_with_link_local() {
   ifaddrs* found = nullptr;
   if (getifaddrs(&found) != 0) return {};
   const std::unique_ptr<ifaddrs, FreeInterfaces> all(found);
@@ -49,11 +49,19 @@ std::vector<std::string> own_addresses() {
     if (!at->ifa_addr || (at->ifa_addr->sa_family != AF_INET && at->ifa_addr->sa_family != AF_INET6))
       continue;
     const std::string address = text_of(*at->ifa_addr);
-    if (address.empty() || device::is_loopback(address) || is_link_local(address)) continue;
+    if (address.empty() || device::is_loopback(address)) continue;
     if (std::find(out.begin(), out.end(), address) == out.end()) out.push_back(address);
   }
   std::stable_partition(out.begin(), out.end(),
                         [](const std::string& address) { return address.find(':') == std::string::npos; });
+  std::stable_partition(out.begin(), out.end(),
+                        [](const std::string& address) { return !is_link_local(address); });
+  return out;
+}
+
+std::vector<std::string> own_addresses() {
+  std::vector<std::string> out = own_addresses_with_link_local();
+  std::erase_if(out, is_link_local);
   return out;
 }
 

@@ -48,9 +48,11 @@ const std::map<std::string, Names>& allowed() {
       {"session/drawing", {"core", "scene", "tracker", "projector"}},
       {"session", with({"gui", "exchange/poses", "wizard", "session/drawing"})},
       {"remote", with({"gui", "session", "session/drawing"})},
-      {"validate", with({"wizard", "session"})},
+      {"nodes", with({"gui", "wizard", "session", "session/drawing", "remote"})},
+      {"validate", with({"wizard", "session", "session/drawing"})},
       {"apps",
-       with({"gui", "exchange", "exchange/printing", "design", "wizard", "session", "remote", "validate"})},
+       with({"gui", "exchange", "exchange/printing", "design", "wizard", "session", "session/drawing",
+             "remote", "nodes", "validate"})},
   };
   return arrows;
 }
@@ -87,8 +89,9 @@ const std::map<std::string, Names>& guests() {
       {"EGL/", {"device"}},
       {"CLI/", {"apps"}},
       {"imgui", {"gui", "wizard", "session"}},
-      {"boost/", {"remote"}},
-      {"openssl/", {"remote"}},
+      {"boost/", {"remote", "nodes"}},
+      {"dds/", {"nodes"}},
+      {"openssl/", {"remote", "nodes"}},
       {"qrencode", {"gui"}},
       {"turbojpeg", {"device"}},
       {"jpeglib", {"core"}},

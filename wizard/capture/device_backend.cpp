@@ -6,8 +6,6 @@
 #include <thread>
 
 #include "core/image_io.h"
-#include "device/open_camera.h"
-#include "device/open_display.h"
 
 namespace limn::wizard {
 namespace {
@@ -165,22 +163,21 @@ Status DeviceBackend::show_all(const std::vector<cv::Mat>& images) {
   return {};
 }
 
-Result<DeviceBackend::Devices> open_devices(const device::Devices& named,
-                                            const Result<device::Desktop>& desktop) {
+Result<DeviceBackend::Devices> open_devices(const device::Devices& named, device::DeviceOpener* opener) {
   DeviceBackend::Devices open{
       .cameras = {},
       .projectors = {},
       .now = [] { return std::chrono::time_point_cast<Stamp::duration>(std::chrono::steady_clock::now()); },
       .wait = [](double seconds) { std::this_thread::sleep_for(std::chrono::duration<double>(seconds)); }};
   for (const device::CameraConfig& wanted : named.cameras) {
-    LIMN_TRY(auto camera, device::open_camera(wanted));
+    LIMN_TRY(auto camera, opener->camera(wanted));
     open.cameras.push_back(std::move(camera));
     if (wanted.sees == Spectrum::infrared) open.infrared.push_back(wanted.name);
   }
   for (device::DisplayConfig wanted : named.displays) {
     if (!wanted.name.starts_with("projector")) continue;
     wanted.latency_s = 0;  // DeviceBackend adds the measured latency
-    LIMN_TRY(auto display, device::open_display(wanted, desktop ? &*desktop : nullptr));
+    LIMN_TRY(auto display, opener->display(wanted));
     open.projectors.push_back(std::move(display));
   }
   if (open.cameras.empty() || open.projectors.empty())

@@ -9,7 +9,7 @@
 
 #include "core/image_writer.h"
 #include "device/camera_source.h"
-#include "device/desktop.h"
+#include "device/device_opener.h"
 #include "device/devices_file.h"
 #include "device/display.h"
 #include "wizard/capture/backend.h"
@@ -58,8 +58,7 @@ class DeviceBackend {
 
 /// Opens the cameras and projectors of a devices file. Error: one does not work, or there is not at
 /// least one of each.
-Result<DeviceBackend::Devices> open_devices(const device::Devices& named,
-                                            const Result<device::Desktop>& desktop);
+Result<DeviceBackend::Devices> open_devices(const device::Devices& named, device::DeviceOpener* opener);
 
 /// The devices' names and sizes, as captures list them. `infrared`: the names of those that see no projected
 /// light.

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/frame.h"
+#include "core/result.h"
+#include "nodes/messages.h"
+#include "nodes/room_keys.h"
+
+namespace limn::nodes {
+
+/// The topics of a room: one for each message that is sent, in the order of Message.
+enum class Topic { offer, setup, moment, clock_request, clock_answer, sighting, order, answer, health };
+inline constexpr std::size_t k_topics = 9;
+
+/// Whether each receiver gets the topic's samples through a writer of its own, so that a slow receiver delays
+/// nobody else.
+constexpr bool is_directed(Topic topic) { return topic == Topic::order || topic == Topic::answer; }
+/// Whether samples wait in the engine until take_waiting() is called, and none is lost.
+constexpr bool is_reliable(Topic topic) {
+  return is_directed(topic) || topic == Topic::offer || topic == Topic::setup;
+}
+
+/// What the engine reports. The functions are called from the engine's own threads or from take_waiting(),
+/// and must return soon.
+class EngineEvents {
+ public:
+  virtual ~EngineEvents() = default;
+  /// A sample has come: a struct of limn_room.idl, valid during the call.
+  virtual void receive_sample(Topic topic, const void* sample, Stamp arrived_at) = 0;
+  virtual void notice_departure(const Sender& sender) = 0;
+  /// Samples of reliable topics wait.
+  virtual void notice_waiting() = 0;
+  /// What the engine would print: a warning or an error.
+  virtual void notice_warning(const std::string& text) = 0;
+};
+
+struct EngineOptions {
+  RoomKeys keys;
+  int domain = 0;  ///< room_domain() of its name
+  Sender self;
+  bool is_host = false;
+  std::vector<std::string> peers, interfaces;
+  double liveliness_s = 0.5;
+};
+
+/// A data-distribution engine: the one type of which a shared library is loaded only for sessions with a
+/// room.
+class Engine {
+ public:
+  virtual ~Engine() = default;
+  /// Sends a struct of limn_room.idl to all receivers of the topic. Error: the engine's.
+  virtual Status write(Topic topic, const void* sample) = 0;
+  /// Sends to one program, for directed topics; waits up to 2 s until it is connected and has room.
+  virtual Status write_to(const Sender& receiver, Topic topic, const void* sample) = 0;
+  /// Connects the directed topics to a program early, so that write_to() need not wait.
+  virtual void connect(const Sender& receiver) = 0;
+  /// Forgets what a program that has gone did not take.
+  virtual void forget(const Sender& receiver) = 0;
+  /// Reports what waits in reliable topics.
+  virtual void take_waiting() = 0;
+};
+
+/// The engine's shared library, which is loaded at the first call: the file that the environment variable
+/// LIMN_ROOM_ENGINE names, else liblimn_room_dds.so beside the program, in ../lib/limn, or where it was
+/// built. `events` must outlive the engine. Error: it is not there, a library that it needs is not installed,
+/// or the engine's own.
+Result<std::unique_ptr<Engine>> make_engine(const EngineOptions& options, EngineEvents* events);
+
+/// The function that the shared library exports. `events` must outlive the engine. Null: it failed, and
+/// `problem` says why.
+using MakeEngine = Engine*(const EngineOptions& options, EngineEvents* events, std::string* problem);
+inline constexpr const char* k_make_engine = "limn_make_room_engine";
+
+}  // namespace limn::nodes

@@ -1,0 +1,185 @@
+#include "nodes/node.h"
+
+#include <algorithm>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/file.h"
+#include "core/log.h"
+#include "core/stopwatch.h"
+#include "core/version.h"
+#include "device/gl_context.h"
+#include "nodes/node_devices.h"
+#include "nodes/node_frames.h"
+#include "nodes/orders.h"
+
+namespace limn::nodes {
+namespace {
+
+constexpr auto k_news_wait = std::chrono::milliseconds(20);
+constexpr double k_fade_s = 0.4;  // after the host has gone, which is noticed half a second later
+constexpr double k_health_every_s = 0.2;
+constexpr double k_monitors_every_s = 1;
+constexpr double k_clock_limit_s = 3;  // for the first comparison of the clocks
+
+// What the node does between messages, on the thread of the OpenGL context.
+class NodeLoop {
+ public:
+  NodeLoop(const NodeOptions& options,
+           Room* room,
+           const device::Desktop* desktop,
+           const device::GlContext& context,
+           AppendLog log)
+      : room_(room),
+        displays_(desktop),
+        cameras_(room),
+        loader_(options.fetch, options.work),
+        log_(std::move(log)) {
+    offer_.version = version();
+    offer_.renderer = context.description();
+    if (options.offers_cameras) offer_.cameras = NodeCameras::found();
+  }
+
+  void step() {
+    offer_monitors();
+    room_->wait(k_news_wait);
+    note_host();
+    if (auto setup = room_->take_setup(); setup && host_) loader_.load(*setup, *host_);
+    if (auto loaded = loader_.take_loaded()) begin(std::move(*loaded));
+    carry_out_orders();
+    if (const auto moment = room_->take_moment()) show(*moment);
+    if (gone_at_) fade();
+    report();
+  }
+
+  void end() {
+    if (frames_) frames_->dim(0);
+    log_.flush();
+  }
+
+ private:
+  void offer_monitors() {
+    if (offered_at_ && seconds_between(*offered_at_, now()) < k_monitors_every_s) return;
+    std::vector<OfferedDevice> monitors = displays_.monitors();
+    const bool is_new = !offered_at_ || monitors != offer_.monitors;
+    offered_at_ = now();
+    if (!is_new) return;
+    offer_.monitors = std::move(monitors);
+    if (const Status sent = room_->offer(offer_); !sent) log_warning("node: {}", sent.message());
+  }
+
+  void note_host() {
+    const std::optional<Machine> host = room_->host();
+    if (host && (!host_ || host_->sender.run != host->sender.run)) greet(*host);
+    if (host_ && !host) {
+      log_warning("node: the host {} has gone; the light fades out until it is back", host_->sender.node);
+      gone_at_ = now();
+    }
+    host_ = host;
+  }
+
+  void greet(const Machine& host) {
+    if (host.offer.protocol != k_protocol)
+      log_warning(
+          "node: the host {} has version {}, and this machine has {}. Install the same version on both.",
+          host.sender.node, host.offer.version, version());
+    else
+      log_info("node: {} is the host", host.sender.node);
+  }
+
+  void begin(Result<LoadedSetup> loaded) {
+    if (loaded && host_ && loaded->run != host_->sender.run) return;  // of a host that has gone
+    problem_.clear();
+    frames_.reset();
+    auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)
+                         : Result<std::unique_ptr<NodeFrames>>(loaded.error());
+    if (frames) {
+      frames_ = std::move(*frames);
+      gone_at_.reset();
+      return;
+    }
+    problem_ = frames.message();
+    log_warning("node: {}", problem_);
+  }
+
+  // Orders that come before the clocks are compared wait for that.
+  void carry_out_orders() {
+    std::ranges::move(room_->take_orders(), std::back_inserter(orders_));
+    if (orders_.empty()) waits_since_.reset();
+    if (!orders_.empty() && !waits_since_) waits_since_ = now();
+    if (!room_->host_clock() && waits_since_ && seconds_between(*waits_since_, now()) < k_clock_limit_s)
+      return;
+    for (const auto& [order, host] : std::exchange(orders_, {})) carry_out(order, host);
+  }
+
+  void carry_out(const Order& order, const std::string& host) {
+    if (is_for_camera(order)) return cameras_.carry_out(order, host);
+    Answer answer = carried_out(order, room_->host_clock(), &displays_);
+    answer.to = host;
+    if (const Status sent = room_->send(answer); !sent) log_warning("node: {}", sent.message());
+  }
+
+  void show(const Moment& moment) {
+    if (!frames_) return;
+    gone_at_.reset();
+    frames_->show(moment, room_->host_clock(), &log_);
+  }
+
+  void fade() {
+    const double share = 1 - seconds_between(*gone_at_, now()) / k_fade_s;
+    if (frames_) frames_->dim(share);
+    if (share <= 0) gone_at_.reset();
+  }
+
+  void report() {
+    if (seconds_between(reported_at_, now()) < k_health_every_s) return;
+    reported_at_ = now();
+    Health health;
+    if (const auto clock = room_->host_clock()) {
+      health.clock_offset_s = 1e-9 * static_cast<double>(clock->offset.count());
+      health.clock_stddev_s = clock->stddev_s;
+    }
+    if (frames_) frames_->report(&health);
+    if (!problem_.empty()) health.problems.push_back(problem_);
+    if (const Status sent = room_->send(health); !sent) log_warning("node: {}", sent.message());
+  }
+
+  Room* room_;
+  NodeDisplays displays_;
+  CameraWorker cameras_;
+  SetupLoader loader_;
+  AppendLog log_;
+  Offer offer_;
+  std::optional<Stamp> offered_at_;
+  std::optional<Machine> host_;
+  std::vector<Room::ReceivedOrder> orders_;  // that wait
+  std::optional<Stamp> waits_since_;
+  std::unique_ptr<NodeFrames> frames_;
+  std::string problem_;           // why there are no frames
+  std::optional<Stamp> gone_at_;  // when the host was found to have gone, while the light fades
+  Stamp reported_at_;
+};
+
+}  // namespace
+
+Status run_node(const NodeOptions& options,
+                Room* room,
+                const device::Desktop* desktop,
+                const std::atomic<bool>& is_ended) {
+  LIMN_TRY(const device::GlContext context, device::GlContext::create());
+  AppendLog log;
+  if (!options.out.empty()) {
+    LIMN_TRY_STATUS(make_folder(options.out));
+    LIMN_TRY(log, AppendLog::create(options.out / "shown.csv", k_shown_log_header));
+  }
+  NodeLoop loop(options, room, desktop, context, std::move(log));
+  while (!is_ended) loop.step();
+  loop.end();
+  return {};
+}
+
+}  // namespace limn::nodes

@@ -1,0 +1,41 @@
+#include "nodes/node_devices.h"
+
+#include "device/devices_file.h"
+#include "device/gige_camera.h"
+#include "device/v4l2_camera.h"
+
+namespace limn::nodes {
+
+std::vector<OfferedDevice> NodeDisplays::monitors() const {
+  std::vector<OfferedDevice> out;
+  if (desktop_)
+    for (const device::Monitor& monitor : desktop_->monitors()) out.push_back({monitor.name, monitor.size});
+  out.push_back({device::k_display_kinds.text(device::DisplayKind::offscreen), {}});
+  return out;
+}
+
+std::vector<OfferedDevice> NodeCameras::found() {
+  std::vector<OfferedDevice> out;
+  for (const device::V4l2Device& found : device::v4l2_cameras())
+    if (found.problem.empty()) out.push_back({"v4l2:" + found.path, {}});
+  for (const std::string& id : device::gige_cameras()) out.push_back({"gige:" + id, {}});
+  return out;
+}
+
+Result<device::Display*> NodeDisplays::display(const device::DisplayConfig& config) {
+  std::unique_ptr<device::Display>& display = displays_[device::devices_text({}, {&config, 1})];
+  if (!display) {
+    LIMN_TRY(display, device::open_display(config, desktop_));
+  }
+  return display.get();
+}
+
+Result<device::CameraSource*> NodeCameras::camera(const device::CameraConfig& config) {
+  std::unique_ptr<device::CameraSource>& camera = cameras_[device::devices_text({&config, 1}, {})];
+  if (!camera) {
+    LIMN_TRY(camera, device::open_camera(config));
+  }
+  return camera.get();
+}
+
+}  // namespace limn::nodes

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/append_log.h"
+#include "core/result.h"
+#include "nodes/clock_estimator.h"
+#include "nodes/display_schedule.h"
+#include "nodes/node_devices.h"
+#include "nodes/setup_loader.h"
+#include "session/drawing/frame_drawer.h"
+
+namespace limn::nodes {
+
+/// Draws a session's frames for the projectors that are plugged into this node. An OpenGL context must be
+/// current at every call and at destruction.
+class NodeFrames {
+ public:
+  /// `node`: this machine's name. Error: the scene cannot be drawn here. A display that cannot be opened is
+  /// tried again at each frame, and a problem until then.
+  static Result<std::unique_ptr<NodeFrames>> create(LoadedSetup setup,
+                                                    const std::string& node,
+                                                    NodeDisplays* displays);
+
+  /// Draws a frame and shows it so that its light appears at FrameDescription::shown_at of the host's clock.
+  /// `log`: one line for each image that was shown. A moment of another setup is ignored.
+  void show(const Moment& moment, const std::optional<ClockEstimate>& clock, AppendLog* log);
+  /// Shows the last images with this share of their light.
+  void dim(double share);
+
+  bool belongs_to(std::uint64_t run, std::uint64_t revision) const {
+    return setup_.run == run && setup_.revision == revision;
+  }
+  bool has_projectors() const { return !outputs_.empty(); }
+  /// Copies what it knows of frames and displays.
+  void report(Health* health) const;
+
+ private:
+  struct Output {
+    device::DisplayConfig config;
+    std::size_t projector = 0;  // index in the rig
+    EyeImages image = {};
+    DisplaySchedule schedule = {};
+    std::string problem = {};
+  };
+  NodeFrames(LoadedSetup setup, NodeDisplays* displays) : setup_(std::move(setup)), displays_(displays) {}
+  void show_image(const EyeImages& image, Output* output, Stamp* shown_at);
+
+  LoadedSetup setup_;
+  NodeDisplays* displays_;
+  std::unique_ptr<session::FrameDrawer> drawer_;
+  std::vector<Output> outputs_;
+  std::uint64_t shown_ = 0, missed_ = 0;
+  double draw_ms_ = 0, late_ms_ = 0;
+};
+
+/// The first line of the log that NodeFrames::show writes.
+constexpr std::string_view k_shown_log_header = "frame,projector,wanted_at_ns,shown_at_ns,fingerprint\n";
+
+}  // namespace limn::nodes

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "core/result.h"
+#include "nodes/clock_estimator.h"
+#include "nodes/messages.h"
+#include "nodes/room_link.h"
+
+namespace limn::nodes {
+
+/// A machine of the room that can be heard.
+struct Machine {
+  Sender sender;
+  Offer offer;
+  std::optional<Health> health;  ///< a node's last
+};
+
+/// The room as this machine knows it. A thread of its own receives all messages, answers what the other
+/// machines ask about the clock, and, on a node, compares the clock with the host's. Safe from several
+/// threads.
+class Room {
+ public:
+  explicit Room(std::unique_ptr<RoomLink> link);
+  ~Room();
+  Room(const Room&) = delete;
+  Room& operator=(const Room&) = delete;
+
+  const Sender& self() const { return link_->self(); }
+  /// Says what this machine is and has. Error: the engine's message.
+  Status offer(const Offer& offer);
+  Status send(const Message& message) { return link_->send(message); }
+
+  /// The other machines that can be heard, by name.
+  std::vector<Machine> machines() const;
+  std::optional<Machine> find(const std::string& node) const;
+  std::optional<Machine> host() const;
+
+  /// For nodes: the host's clock; nullopt before the first answers, and without a host.
+  std::optional<ClockEstimate> host_clock() const;
+  /// For nodes: waits until a moment, a setup or an order is there, or the host comes or goes.
+  void wait(std::chrono::nanoseconds limit);
+  std::optional<Moment> take_moment();
+  std::optional<Setup> take_setup();
+  /// An order, and the host that sent it.
+  struct ReceivedOrder {
+    Order order;
+    std::string host;
+  };
+  std::vector<ReceivedOrder> take_orders();
+
+  /// For the host: sends an order and waits for its answer. Error: the node's message, no answer in time, or
+  /// no such machine.
+  Result<Answer> ask(Order order, double limit_s);
+  /// For the host: what cameras on nodes have seen since the last call; waits up to `limit` for something.
+  std::vector<Sighting> take_sightings(std::chrono::nanoseconds limit);
+
+ private:
+  void run();
+  void compare_clocks();
+  void note(Received received);
+  void note_offer(const Sender& from, const Offer& offer);
+  void note_departure(const Sender& from);
+
+  std::unique_ptr<RoomLink> link_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<std::string, Machine> machines_;
+  bool is_host_ = false;
+  std::uint64_t clock_run_ = 0;  // the run of the host whose clock is estimated
+  ClockEstimator clock_;
+  std::uint64_t clock_requests_ = 0, orders_ = 0;
+  Stamp asked_clock_at_;
+  std::optional<Moment> moment_;
+  std::optional<std::pair<Setup, Sender>> setup_;
+  std::vector<ReceivedOrder> waiting_orders_;
+  std::map<std::uint64_t, std::optional<Answer>> answers_;  // of orders that somebody waits for
+  std::deque<Sighting> sightings_;
+  bool has_news_ = false;
+  std::atomic<bool> is_stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace limn::nodes

@@ -1,0 +1,110 @@
+#include "nodes/room_host.h"
+
+#include <algorithm>
+#include <array>
+#include <thread>
+
+#include "core/log.h"
+#include "core/names.h"
+
+namespace limn::nodes {
+namespace {
+
+namespace fs = std::filesystem;
+
+template <class Config>
+std::vector<Config> at_nodes(const std::vector<Config>& devices) {
+  std::vector<Config> out;
+  std::ranges::copy_if(devices, std::back_inserter(out),
+                       [](const Config& device) { return !device.host.empty(); });
+  return out;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RoomHost>> RoomHost::open(Room* room,
+                                                 FileOffer* files,
+                                                 const device::Devices& devices,
+                                                 const fs::path& work,
+                                                 AppendLog log,
+                                                 session::SessionSetup* setup) {
+  const auto displays = at_nodes(devices.displays);
+  const auto cameras = at_nodes(devices.cameras);
+  std::unique_ptr<RoomHost> out(
+      new RoomHost(room, files, device::devices_text(cameras, displays), work, std::move(log)));
+  for (const device::DisplayConfig& display : displays) {
+    out->nodes_.insert(display.host);
+    if (find_named(setup->rig.projectors, display.name)) out->projectors_.push_back(display.name);
+  }
+  for (const device::CameraConfig& camera : cameras) out->nodes_.insert(camera.host);
+  LIMN_TRY_STATUS(out->send_setup(*setup));
+  LIMN_TRY(setup->rig, load_rig(work / "setup-1/rig"));
+  return out;
+}
+
+Status RoomHost::send_setup(const session::SessionSetup& setup) {
+  ++setup_.revision;
+  const fs::path folder = work_ / fmt::format("setup-{}", setup_.revision);
+  LIMN_TRY_STATUS(session::save_setup(setup, folder));
+  LIMN_TRY(setup_.files, files_->share(folder));
+  setup_.devices = devices_;
+  return room_->send(setup_);
+}
+
+void RoomHost::note_description(const session::FrameDescription& frame) {
+  Moment moment{setup_.revision, frame};
+  moment.frame.number = ++frames_;  // a composer counts anew after a change of the scene
+  if (const Status sent = room_->send(moment); !sent) log_warning("room: {}", sent.message());
+}
+
+// Tells people which machines come, go and fail.
+void RoomHost::apply_edits(const session::SessionMoment& moment) {
+  std::set<std::string> problems;
+  for (const std::string& name : nodes_) {
+    const std::optional<Machine> node = room_->find(name);
+    if (!node && absent_.insert(name).second)
+      moment.session.warn(moment.at, fmt::format("{} is not in the room; its devices are missing", name));
+    if (node && absent_.erase(name) > 0)
+      moment.telemetry.note(moment.at, fmt::format("{} is in the room", name));
+    if (!node || !node->health) continue;
+    for (const std::string& problem : node->health->problems)
+      problems.insert(fmt::format("{}: {}", name, problem));
+  }
+  for (const std::string& problem : problems)
+    if (!problems_.contains(problem)) moment.session.warn(moment.at, problem);
+  problems_ = std::move(problems);
+}
+
+void RoomHost::publish_state(const session::SessionMoment& moment) {
+  if (log_.is_open() && moment.shown) log_images(moment.session, moment.at);
+  if (moment.session.scenes() == scenes_) return;
+  scenes_ = moment.session.scenes();
+  if (const Status sent = send_setup(moment.session.setup()); !sent)
+    moment.session.warn(moment.at, fmt::format("the nodes did not get the change: {}", sent.message()));
+}
+
+void RoomHost::log_images(const session::Session& session, Stamp at) {
+  const std::vector<Imager>& projectors = session.setup().rig.projectors;
+  for (const std::string& name : projectors_) {
+    const auto index = static_cast<std::size_t>(find_named(projectors, name) - projectors.data());
+    const EyeImages images = session.composed().images(index);
+    const std::array<cv::Mat, 2> eyes = {images.left, images.right};
+    log_.add(fmt::format("{},{},{:016x}\n", frames_, name, session::fingerprint(eyes)), at);
+  }
+}
+
+Status check_no_other_host(const Room& room, double wait_s) {
+  const Stamp begun = now();
+  while (seconds_between(begun, now()) < wait_s) {
+    if (const auto host = room.host())
+      return error(
+          "room: expected no host in it, found {}. A room has one host: end limn live or limn calibrate "
+          "there, or "
+          "start limn node here.",
+          host->sender.node);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  return {};
+}
+
+}  // namespace limn::nodes

@@ -1,0 +1,208 @@
+"""Runs a host and its nodes as programs in network and time namespaces of one machine, and breaks things.
+
+    network_test.py LIMN FOLDER [SCENARIO ...]
+
+Needs root. Exit code 77: namespaces are not permitted here.
+"""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+NODES = ["left", "right"]
+PREFIX = "10.77.0."
+
+
+def run(*command, check=True):
+    return subprocess.run(command, check=check, capture_output=True, text=True)
+
+
+class Network:
+    """A bridge and a namespace for each machine, with addresses 10.77.0.1 and so on."""
+
+    def __init__(self, machines):
+        self.machines = machines
+        self.names = {name: f"limn-{os.getpid()}-{name}" for name in machines}
+        self.switch = f"limn-{os.getpid()}-switch"
+        run("ip", "netns", "add", self.switch)
+        self.in_switch("ip", "link", "add", "br0", "type", "bridge")
+        self.in_switch("ip", "link", "set", "br0", "up")
+        for number, name in enumerate(machines, 1):
+            namespace = self.names[name]
+            run("ip", "netns", "add", namespace)
+            port = f"p{number}"
+            self.in_switch("ip", "link", "add", port, "type", "veth", "peer", "name", "eth0", "netns", namespace)
+            self.in_switch("ip", "link", "set", port, "master", "br0", "up")
+            run("ip", "-n", namespace, "addr", "add", f"{PREFIX}{number}/24", "dev", "eth0")
+            run("ip", "-n", namespace, "link", "set", "eth0", "up")
+            run("ip", "-n", namespace, "link", "set", "lo", "up")
+
+    def in_switch(self, *command):
+        run("ip", "netns", "exec", self.switch, *command)
+
+    def plug(self, name, is_plugged):
+        self.in_switch("ip", "link", "set", f"p{self.machines.index(name) + 1}", "up" if is_plugged else "down")
+
+    def command(self, name, command, clock_ahead_s=0):
+        clock = ["unshare", "--time", "--monotonic", str(clock_ahead_s)] if clock_ahead_s else []
+        return ["ip", "netns", "exec", self.names[name], *clock, *map(str, command)]
+
+    def close(self):
+        for namespace in [*self.names.values(), self.switch]:
+            run("ip", "netns", "del", namespace, check=False)
+
+
+class Machines:
+    """The programs of one scenario."""
+
+    def __init__(self, limn, folder, network):
+        self.limn, self.folder, self.network = limn, folder, network
+        self.programs = []
+        self.environment = dict(os.environ, HOME=str(folder / "home"), XDG_CACHE_HOME=str(folder / "cache"),
+                                XDG_CONFIG_HOME=str(folder / "config"))
+
+    def start(self, name, command, clock_ahead_s=0):
+        log = open(self.folder / f"{name}.log", "ab")
+        program = subprocess.Popen(self.network.command(name, command, clock_ahead_s), stdout=log, stderr=log,
+                                   env=self.environment)
+        self.programs.append(program)
+        return program
+
+    def start_node(self, name, run_number=0, clock_ahead_s=100):
+        return self.start(name, [self.limn, "node", "--join", "studio", "--name", name, "--out",
+                                 self.folder / f"{name}-{run_number}"], clock_ahead_s)
+
+    def start_host(self, seconds, out="host", extra=()):
+        return self.start("host", [self.limn, "live", "--room", "studio", "--name", "host", "--devices",
+                                   self.folder / "devices.json", "--rig", self.folder / "recording/rig", "--scene",
+                                   self.folder / "recording/scene", "--seconds", seconds, "--out",
+                                   self.folder / out, *extra])
+
+    def end(self):
+        for program in self.programs:
+            if program.poll() is None:
+                program.send_signal(signal.SIGTERM)
+        for program in self.programs:
+            try:
+                program.wait(10)
+            except subprocess.TimeoutExpired:
+                program.kill()
+                raise AssertionError(f"a program did not end: {program.args}")
+
+
+def fingerprints(path):
+    with open(path) as file:
+        return {(row["frame"], row["projector"]): row["fingerprint"] for row in csv.DictReader(file)}
+
+
+def shown(path):
+    with open(path) as file:
+        return list(csv.DictReader(file))
+
+
+def prepare(limn, folder, images=3000):
+    """A recorded session in the studio, whose camera images the host plays again and again, and devices at nodes."""
+    environment = dict(os.environ, HOME=str(folder / "home"), XDG_CONFIG_HOME=str(folder / "config"))
+    subprocess.run([limn, "live", "--resolution", "0.25", "--seconds", "1", "--record", folder / "recording"],
+                   check=True, env=environment, capture_output=True)
+    recorded = sorted((folder / "recording/frames/camera0").iterdir())
+    film = folder / "film"
+    film.mkdir()
+    there_and_back = recorded + recorded[-2:0:-1]
+    for number in range(images):
+        image = there_and_back[number % len(there_and_back)]
+        (film / f"{number:06}{image.suffix}").symlink_to(image)
+    subprocess.run([limn, "room", "create", "studio"], check=True, env=environment, capture_output=True)
+    rig = json.loads((folder / "recording/rig/rig.json").read_text())
+    displays = [{"name": projector["name"], "host": node, "monitor": "offscreen",
+                 "size": projector["size"]}
+                for projector, node in zip(rig["projectors"], NODES)]
+    devices = {"schema": "limn.devices/1", "cameras": [{"name": "camera0", "source": str(film)}],
+               "displays": displays}
+    (folder / "devices.json").write_text(json.dumps(devices))
+
+
+def images_are_the_hosts(machines):
+    """Every image that a node shows is the host's, and nearly all frames arrive."""
+    for node in NODES:
+        machines.start_node(node)
+    host = machines.start_host(20)
+    assert host.wait(60) == 0, "the host failed"
+    machines.end()
+    wanted = fingerprints(machines.folder / "host/frames.csv")
+    for node in NODES:
+        rows = shown(machines.folder / f"{node}-0/shown.csv")
+        assert len(rows) > 100, f"{node} showed {len(rows)} images"
+        wrong = [row["frame"] for row in rows if wanted[row["frame"], row["projector"]] != row["fingerprint"]]
+        assert not wrong, f"{node}: {len(wrong)} of {len(rows)} images differ from the host's: {wrong[:5]}"
+        late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows[10:])
+        print(f"{node}: {len(rows)} images equal; from the wanted moment: median {late_ms[len(late_ms) // 2]:.2f} ms, "
+              f"99 % {late_ms[int(0.99 * len(late_ms))]:.2f} ms")
+
+
+def a_killed_node_is_back(machines):
+    """kill -9 of a node: the host goes on, and the node shows images at most 3 s after its restart."""
+    killed = machines.start_node("left")
+    machines.start_node("right")
+    host = machines.start_host(25)
+    time.sleep(10)
+    killed.kill()
+    time.sleep(2)
+    restarted = time.time()
+    machines.start_node("left", 1)
+    path = machines.folder / "left-1/shown.csv"
+    while time.time() - restarted < 10 and (not path.exists() or path.read_text().count("\n") < 2):
+        time.sleep(0.05)
+    print(f"the node showed images {time.time() - restarted:.1f} s after its restart")
+    assert host.wait(60) == 0, "the host failed"
+    machines.end()
+    session = json.loads((machines.folder / "host/session.json").read_text())
+    notes = json.dumps(session)
+    assert "left is not in the room" in notes and "left is in the room" in notes, notes[-2000:]
+
+
+def a_second_host_is_refused(machines):
+    machines.start_host(12)
+    time.sleep(4)
+    second = machines.start("left", [machines.limn, "live", "--room", "studio", "--name", "second", "--devices",
+                                     machines.folder / "devices.json", "--rig", machines.folder / "recording/rig",
+                                     "--scene", machines.folder / "recording/scene", "--seconds", "1"])
+    assert second.wait(20) == 1
+    assert "expected no host in it, found host" in (machines.folder / "left.log").read_text()
+    machines.end()
+
+
+SCENARIOS = [images_are_the_hosts, a_killed_node_is_back, a_second_host_is_refused]
+
+
+def main():
+    limn, folder = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve()
+    if os.geteuid() != 0 or run("ip", "netns", "add", "limn-probe", check=False).returncode != 0:
+        print("skipped: network namespaces need root")
+        return 77
+    run("ip", "netns", "del", "limn-probe", check=False)
+    chosen = [scenario for scenario in SCENARIOS if not sys.argv[3:] or scenario.__name__ in sys.argv[3:]]
+    for scenario in chosen:
+        place = folder / scenario.__name__
+        subprocess.run(["rm", "-rf", place], check=True)
+        place.mkdir(parents=True)
+        prepare(limn, place)
+        network = Network(["host", *NODES])
+        machines = Machines(limn, place, network)
+        try:
+            scenario(machines)
+            print(f"{scenario.__name__}: passed")
+        finally:
+            for program in machines.programs:
+                program.kill()
+            network.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

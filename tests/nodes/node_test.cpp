@@ -1,0 +1,215 @@
+#include "nodes/node.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <opencv2/core.hpp>
+#include <thread>
+
+#include "core/image_io.h"
+#include "core/version.h"
+#include "device/gl_context.h"
+#include "nodes/node_frames.h"
+#include "nodes/remote_devices.h"
+#include "nodes/room_host.h"
+#include "session/frame_composer.h"
+#include "sim/virtual_rig.h"
+#include "tests/nodes/memory_room.h"
+#include "tests/support/matchers.h"
+#include "tests/support/worlds.h"
+
+namespace limn::nodes {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+// Files "travel" by their path: the first of a setup is its folder.
+class PathOffer final : public FileOffer {
+ public:
+  Result<std::vector<SharedFile>> share(const fs::path& folder) override {
+    return std::vector<SharedFile>{{folder.string(), "", 0}};
+  }
+};
+
+Status copy_files(const Setup& setup, const Offer&, const fs::path& folder) {
+  fs::create_directories(folder);
+  fs::copy(setup.files.at(0).path, folder, fs::copy_options::recursive);
+  return {};
+}
+
+// A node on a thread of its own.
+class RunningNode {
+ public:
+  RunningNode(test::MemoryRoom* room, const std::string& name, const fs::path& folder)
+      : room_(std::make_unique<test::MemoryLink>(room, name)), thread_([this, folder] {
+          const NodeOptions options{
+              .fetch = copy_files, .work = folder / "work", .out = folder, .offers_cameras = false};
+          status_ = run_node(options, &room_, nullptr, is_ended_);
+        }) {}
+  ~RunningNode() {
+    is_ended_ = true;
+    thread_.join();
+    EXPECT_TRUE(status_.ok()) << (status_ ? "" : status_.message());
+  }
+
+ private:
+  std::atomic<bool> is_ended_ = false;
+  Status status_;
+  Room room_;
+  std::thread thread_;
+};
+
+template <class Condition>
+bool holds_within(std::chrono::milliseconds limit, const Condition& condition) {
+  for (const auto begun = std::chrono::steady_clock::now();
+       std::chrono::steady_clock::now() - begun < limit;) {
+    if (condition()) return true;
+    std::this_thread::sleep_for(5ms);
+  }
+  return condition();
+}
+
+device::DisplayConfig offscreen(const std::string& name, const std::string& host, cv::Size size) {
+  device::DisplayConfig config{.name = name, .host = host, .kind = device::DisplayKind::offscreen};
+  config.size = size;
+  return config;
+}
+
+// The host of a session in the studio; its second projector is plugged into the node `left`.
+class NodeTest : public ::testing::Test {
+ protected:
+  NodeTest()
+      : folder_(test::test_folder()),
+        world_(test::studio_world(0.25)),
+        rig_(world_, {.frame_period_s = 0.05, .grab_waits_for_light = false}) {
+    setup_.rig = world_.rig;
+    setup_.scene = *world_.scene;
+  }
+
+  void open_host() {
+    const Imager& projector = setup_.rig.projectors[1];
+    device::Devices devices;
+    devices.displays = {offscreen(projector.name, "left", {projector.width, projector.height})};
+    host_ = std::make_unique<Room>(std::make_unique<test::MemoryLink>(&room_, "host"));
+    client_ = RoomHost::open(host_.get(), &files_, devices, folder_ / "host", AppendLog(), &setup_).value();
+    ASSERT_TRUE(host_->offer({.is_host = true, .version = std::string(version())}).ok());
+    context_ = device::GlContext::create().value();
+    perception_ = session::Perception::create(setup_.scene, setup_.rig).value();
+    composer_ = session::FrameComposer::create(setup_.scene, setup_.rig).value();
+  }
+  // Composes and sends a frame; returns the fingerprint of the node's image.
+  std::uint64_t send_frame() {
+    const int camera = 0;
+    const session::Percepts& percepts = perception_->watch(rig_.expose(std::span(&camera, 1)));
+    const session::FrameTimes times{rig_.now(), shifted(now(), 0.02)};
+    const auto input = session::frame_input(setup_.scene, {}, percepts, show_state(), times);
+    client_->note_description(composer_->describe(input));
+    const std::array<cv::Mat, 2> eyes = {composer_->draw().projectors[1], cv::Mat()};
+    return session::fingerprint(eyes);
+  }
+  const scene::ShowState& show_state() {
+    if (show_state_.slots.empty()) show_state_ = scene::initial_show_state(setup_.scene);
+    return show_state_;
+  }
+  std::uint64_t shown_by(const std::string& node) const {
+    const auto machine = host_->find(node);
+    return machine && machine->health ? machine->health->shown : 0;
+  }
+
+  test::MemoryRoom room_;
+  fs::path folder_;
+  sim::World world_;
+  sim::VirtualRig rig_;
+  session::SessionSetup setup_;
+  PathOffer files_;
+  std::unique_ptr<Room> host_;
+  std::unique_ptr<RoomHost> client_;
+  std::optional<device::GlContext> context_;
+  std::optional<session::Perception> perception_;
+  std::optional<session::FrameComposer> composer_;
+  scene::ShowState show_state_;
+};
+
+// Fingerprints by frame, from shown.csv.
+std::map<std::string, std::string> shown_in(const fs::path& folder) {
+  std::map<std::string, std::string> out;
+  std::ifstream file(folder / "shown.csv");
+  std::string line;
+  std::getline(file, line);
+  EXPECT_EQ(line + "\n", k_shown_log_header);
+  while (std::getline(file, line)) out[line.substr(0, line.find(','))] = line.substr(line.rfind(',') + 1);
+  return out;
+}
+
+TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
+  open_host();
+  std::map<std::string, std::string> wanted;
+  const auto send = [&] {
+    const std::uint64_t hash = send_frame();
+    wanted[std::to_string(wanted.size() + 1)] = fmt::format("{:016x}", hash);
+  };
+  for (const char* run : {"first", "second"}) {
+    const std::uint64_t before = wanted.size();
+    {
+      RunningNode node(&room_, "left", folder_ / run);
+      ASSERT_TRUE(holds_within(20s, [&] {
+        send();
+        return shown_by("left") > before;
+      }));
+      for (int i = 0; i < 10; ++i) {
+        rig_.move("prototype",
+                  Pose(rig_.world().world_from_prototype.rotation,
+                       rig_.world().world_from_prototype.translation + Eigen::Vector3d(1e-3 * i, 0, 0)));
+        send();
+        std::this_thread::sleep_for(100ms);
+      }
+    }
+    EXPECT_TRUE(holds_within(1s, [&] { return !host_->find("left"); }));
+    const auto shown = shown_in(folder_ / run);
+    EXPECT_GT(shown.size(), 5u);
+    for (const auto& [frame, hash] : shown) EXPECT_EQ(hash, wanted.at(frame)) << "frame " << frame;
+  }
+}
+
+TEST_F(NodeTest, ShowsAndGrabsForACalibration) {
+  const cv::Mat image(48, 64, CV_8UC3, cv::Scalar(10, 20, 30));
+  fs::create_directories(folder_ / "images");
+  for (const char* name : {"0.png", "1.png"}) ASSERT_TRUE(write_png(folder_ / "images" / name, image).ok());
+  RunningNode node(&room_, "left", folder_ / "node");
+  Room host(std::make_unique<test::MemoryLink>(&room_, "host"));
+  ASSERT_TRUE(host.offer({.is_host = true, .version = std::string(version())}).ok());
+  ASSERT_TRUE(holds_within(5s, [&] { return host.find("left").has_value(); }));
+  RoomOpener opener(&host, nullptr);
+
+  const auto display = opener.display(offscreen("projector0", "left", {64, 48}));
+  ASSERT_TRUE(display) << display.message();
+  const Stamp before = now();
+  const Result<Stamp> shown_at = (*display)->show(image);
+  ASSERT_TRUE(shown_at) << shown_at.message();
+  EXPECT_NEAR(seconds_between(before, *shown_at), 0.5, 0.5);
+
+  device::CameraConfig config{.name = "camera0", .host = "left"};
+  config.source = (folder_ / "images").string();
+  const auto camera = opener.camera(config);
+  ASSERT_TRUE(camera) << camera.message();
+  EXPECT_EQ((*camera)->size(), cv::Size(64, 48));
+  const Result<Frame> frame = (*camera)->next();
+  ASSERT_TRUE(frame) << frame.message();
+  EXPECT_EQ(cv::norm(frame->image, image, cv::NORM_INF), 0);
+
+  const auto missing = opener.camera({.name = "camera1", .host = "right", .source = "v4l2:/dev/video0"});
+  ASSERT_FALSE(missing);
+  EXPECT_NE(missing.message().find("camera1: expected the machine right"), std::string::npos)
+      << missing.message();
+  const auto no_camera = opener.camera({.name = "camera1", .host = "left", .source = "nothing"});
+  ASSERT_FALSE(no_camera);
+  EXPECT_NE(no_camera.message().find("left"), std::string::npos) << no_camera.message();
+}
+
+}  // namespace
+}  // namespace limn::nodes
