@@ -21,7 +21,7 @@ struct ClockEstimate {
   Stamp at;                            ///< the moment, on this machine's clock
   std::chrono::nanoseconds offset{0};  ///< the other clock minus this one
   double rate = 0;                     ///< what the offset gains in a second; 1e-6 is 1 ppm
-  double stddev_s = 0;                 ///< of the offset, without the path's asymmetry (see ClockEstimator)
+  double stddev_s = 0;                 ///< the offset's, without the path's asymmetry (see ClockEstimator)
   double rate_stddev = 0;
   double round_trip_s = 0;  ///< the shortest time to the other machine and back
   int steps = 0;            ///< how often one of the two clocks has stepped
@@ -53,8 +53,9 @@ struct ClockEstimate {
 /// exchanges can show the contrary. If they differ, the offset is wrong by half the difference, at most half
 /// the shortest round trip; `stddev_s` does not contain this, `most_asymmetry_s()` is its bound.
 ///
-/// Exchanges that lie below the line contradict it: a clock has stepped (a laptop was suspended), or its rate
-/// was changed. After two in a row only these count, and the estimate begins again.
+/// Exchanges below the line contradict it: a clock has stepped (a laptop was suspended), or NTP changes its
+/// rate. After two in a row that are far below, or three that are clearly below, only these count, and the
+/// estimate begins again.
 class ClockEstimator {
  public:
   /// Exchanges that ended before they began, or more than k_window_s before the newest one, are ignored.
@@ -80,7 +81,7 @@ class ClockEstimator {
   // The estimate for newest_s_.
   struct Fit {
     double offset_s = 0, rate = 0;
-    double variance = 0, covariance = 0, rate_variance = 0;  // of offset_s and rate
+    double variance = 0, covariance = 0, rate_variance = 0;  // for offset_s and rate
     double there_s = 0, back_s = 0;  // the lines: the smallest there_s and back_s of Sample
     double scale_s = 0;              // how far the smallest delays are above the line, in the mean
     double window_s = k_window_s;    // how old the exchanges of the next fit may be
@@ -90,9 +91,17 @@ class ClockEstimator {
     double mean = 0, stddev = 100e-6;  // quartz clocks differ by less
   };
 
-  void restart(const ClockExchange& exchange);
+  // How far an exchange is below the lines; at most one is greater than 0. Both are 0 if it is below both:
+  // then the path has become shorter.
+  struct Depth {
+    double there_s = 0, back_s = 0;
+    double most_s() const { return there_s > back_s ? there_s : back_s; }
+  };
+
   Sample sample_of(const ClockExchange& exchange) const;
-  bool contradicts(const Sample& sample) const;
+  Depth depth_of(const Sample& sample) const;
+  double largest_depth_s(const Sample& sample) const;
+  void begin_again(std::size_t exchanges, double offset_s);
   void drop_old();
   Fit fitted() const;
 
@@ -102,7 +111,8 @@ class ClockEstimator {
   double newest_s_ = 0;
   RatePrior prior_;
   Fit fit_;
-  std::optional<ClockExchange> odd_;  // the last exchange, if it contradicts those before
+  std::optional<Sample> odd_;  // the last exchange, if it contradicts those before; it is not in samples_
+  int lower_there_ = 0, lower_back_ = 0;  // how many exchanges in a row are below that line
   int steps_ = 0;
 };
 

@@ -13,7 +13,7 @@ constexpr std::size_t k_most = 40;    // calls that are remembered
 constexpr std::size_t k_enough = 12;  // to know whether the display has refreshes
 constexpr double k_half_frame_s = 0.5 / 60;
 constexpr double k_fixed_s = 0.5e-3;       // a delay that varies by less has nothing to do with refreshes
-constexpr double k_least_coherence = 0.9;  // of the shown moments with a refresh rate (1: all in phase)
+constexpr double k_least_coherence = 0.9;  // between the shown moments and a refresh rate (1: all in phase)
 constexpr std::array k_rates_hz = {24.0, 25.0, 30.0, 50.0,  59.94, 60.0, 72.0,
                                    75.0, 85.0, 90.0, 100.0, 120.0, 144.0};
 

@@ -36,7 +36,7 @@ class DisplaySchedule {
   void find_refresh();
 
   std::deque<Shown> shown_;     // oldest first
-  double least_latency_s_ = 0;  // of all calls: one just before a refresh
+  double least_latency_s_ = 0;  // among all calls: one just before a refresh
   std::optional<double> refresh_s_;
 };
 

@@ -29,7 +29,7 @@ class MessageCheck {
     require(values.allFinite(), field, "finite numbers");
   }
   void pose(const char* field, const Pose& pose) {
-    constexpr double k_tolerance = 1e-3;  // of a quaternion's norm; rounding leaves 1e-15
+    constexpr double k_tolerance = 1e-3;  // for a quaternion's norm; rounding leaves 1e-15
     require(pose.is_finite() && std::abs(pose.rotation.norm() - 1) < k_tolerance, field,
             "a finite pose with a unit quaternion");
   }
@@ -59,7 +59,7 @@ class MessageCheck {
 
  private:
   Status status_;
-  long pixels_ = 0;  // of all images
+  long pixels_ = 0;  // in all images
 };
 
 void check(const scene::RoomLight& light, MessageCheck* to) {

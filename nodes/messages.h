@@ -37,7 +37,7 @@ struct OfferedDevice {
 struct Offer {
   bool is_host = false;  ///< it tracks and decides; a room has one
   int protocol = k_protocol;
-  std::string version = {};   ///< of the program
+  std::string version = {};   ///< the program's
   std::string renderer = {};  ///< the OpenGL driver's name; empty: it draws nothing
   std::vector<OfferedDevice> monitors = {}, cameras = {};
   /// The host's file server: "ADDRESS:PORT" for each of its addresses, and the SHA-256 of its certificate.

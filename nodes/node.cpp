@@ -20,7 +20,7 @@
 namespace limn::nodes {
 namespace {
 
-constexpr auto k_news_wait = std::chrono::milliseconds(20);
+constexpr auto k_message_wait = std::chrono::milliseconds(20);
 constexpr double k_fade_s = 0.4;  // after the host has gone, which is noticed half a second later
 constexpr double k_health_every_s = 0.2;
 constexpr double k_monitors_every_s = 1;
@@ -46,7 +46,7 @@ class NodeLoop {
 
   void step() {
     offer_monitors();
-    room_->wait(k_news_wait);
+    room_->wait(k_message_wait);
     note_host();
     if (auto setup = room_->take_setup(); setup && host_) loader_.load(*setup, *host_);
     if (auto loaded = loader_.take_loaded()) begin(std::move(*loaded));
@@ -92,7 +92,7 @@ class NodeLoop {
   }
 
   void begin(Result<LoadedSetup> loaded) {
-    if (loaded && host_ && loaded->run != host_->sender.run) return;  // of a host that has gone
+    if (loaded && host_ && loaded->run != host_->sender.run) return;  // its host has gone
     problem_.clear();
     frames_.reset();
     auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)

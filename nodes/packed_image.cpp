@@ -67,7 +67,7 @@ std::vector<std::uint8_t> packed(const cv::Mat& image) {
   const std::vector<std::uint8_t> bytes = differences(image);
   const std::size_t pixel = image.elemSize();
   std::vector<std::uint8_t> out;
-  std::size_t begin = 0;  // of the pixels that are in no run
+  std::size_t begin = 0;  // where the pixels begin that are in no run
   for (std::size_t at = 0; at < bytes.size();) {
     const std::size_t run = run_length(bytes, at, pixel);
     if (run < k_least_run || run == pixel) {

@@ -9,7 +9,7 @@ namespace limn::nodes {
 namespace {
 
 constexpr auto k_receive_wait = std::chrono::milliseconds(20);
-constexpr std::size_t k_most_sightings = 64;  // of all cameras; older ones are useless
+constexpr std::size_t k_most_sightings = 64;  // from all cameras; older ones are useless
 
 }  // namespace
 
@@ -90,7 +90,7 @@ void Room::note(Received received) {
     if (is_known) machine->second.health = std::move(*health);
     return;
   }
-  has_news_ = true;
+  has_arrived_ = true;
   changed_.notify_all();
 }
 
@@ -144,8 +144,8 @@ std::optional<ClockEstimate> Room::host_clock() const {
 
 void Room::wait(std::chrono::nanoseconds limit) {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, limit, [&] { return has_news_; });
-  has_news_ = false;
+  changed_.wait_for(lock, limit, [&] { return has_arrived_; });
+  has_arrived_ = false;
 }
 
 std::optional<Moment> Room::take_moment() {

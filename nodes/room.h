@@ -85,9 +85,9 @@ class Room {
   std::optional<Moment> moment_;
   std::optional<std::pair<Setup, Sender>> setup_;
   std::vector<ReceivedOrder> waiting_orders_;
-  std::map<std::uint64_t, std::optional<Answer>> answers_;  // of orders that somebody waits for
+  std::map<std::uint64_t, std::optional<Answer>> answers_;  // by order that somebody waits for
   std::deque<Sighting> sightings_;
-  bool has_news_ = false;
+  bool has_arrived_ = false;
   std::atomic<bool> is_stopping_ = false;
   std::thread thread_;
 };

@@ -15,7 +15,7 @@ enum class RoomRole { host, node };
 struct RoomKeys {
   std::string name;         ///< the room's
   std::string authority;    ///< the certificate that signed all others
-  std::string certificate;  ///< of the role
+  std::string certificate;  ///< the role's
   std::string private_key;
   std::string governance;   ///< nobody without keys, everything encrypted
   std::string permissions;  ///< which role may send what

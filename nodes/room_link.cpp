@@ -19,7 +19,7 @@ namespace {
 // The offer is repeated, because a machine that was silent for a while counts as there again with its next
 // offer.
 constexpr auto k_offer_interval = std::chrono::seconds(1);
-constexpr std::uint64_t k_most_warnings = 20;  // of the engine, for each link
+constexpr std::uint64_t k_most_warnings = 20;  // the engine's, for each link
 
 // The machine that a message is for; null: it is for all.
 const std::string* receiver_of(const Message& message) {

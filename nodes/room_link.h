@@ -31,7 +31,7 @@ struct RoomLinkOptions {
 struct LinkCounts {
   std::uint64_t received = 0;
   std::uint64_t refused = 0;   ///< messages whose content was not valid; they are left out
-  std::uint64_t warnings = 0;  ///< of the engine; the first are printed
+  std::uint64_t warnings = 0;  ///< the engine's; the first are printed
 };
 
 /// The connection to the other machines of a room. Messages have the reliability that their comments in

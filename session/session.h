@@ -20,9 +20,9 @@
 #include "session/recovering_composer.h"
 #include "session/scene_watch.h"
 #include "session/show_store.h"
-#include "session/swapped_cameras.h"
 #include "session/tablet_registry.h"
 #include "session/telemetry.h"
+#include "tracker/swapped_cameras.h"
 
 namespace limn::session {
 
@@ -152,7 +152,7 @@ class Session {
   Prediction prediction_;
   std::size_t moments_ = 0;
   DriftNotices drift_;
-  SwappedCamerasCheck swapped_;
+  tracker::SwappedCamerasCheck swapped_;
   RecalibrationStatus recalibration_;
   std::string pace_;
   int scenes_ = 1;

@@ -23,7 +23,7 @@ constexpr int k_datagram_bytes = 1400, k_fragment_bytes = 1152;
 constexpr const char* k_receive_buffer = "8MiB";  // asked for; the kernel limits it to net.core.rmem_max
 constexpr std::size_t k_most_interfaces = 4;      // MAX_XMIT_CONNS of Cyclone DDS
 constexpr int k_last_participant = 60;            // programs on one machine; the domain has ports for 119
-constexpr int k_peer_participants = 4;            // of them, those that machines without multicast find
+constexpr int k_peer_participants = 4;            // among them, those that machines without multicast find
 // Ports of a participant (DDSI-RTPS 2.5, 9.6.2).
 constexpr int k_port_base = 7400, k_domain_gain = 250, k_participant_gain = 2, k_unicast_offset = 10;
 

@@ -17,7 +17,7 @@ namespace limn::session {
 /// A part whose marker was lost and that is fading out.
 struct FadingPart {
   scene::PosedPart part;
-  double share = 0;  ///< of its light that is left, 0 … 1
+  double share = 0;  ///< the share of its light that is left, 0 … 1
 };
 
 /// The whole scene after its prototype was lost.

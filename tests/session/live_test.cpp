@@ -24,7 +24,6 @@
 #include "session/scene_watch.h"
 #include "session/script.h"
 #include "session/session.h"
-#include "session/swapped_cameras.h"
 #include "session/telemetry.h"
 #include "session/virtual_room.h"
 #include "sim/virtual_rig.h"
@@ -32,6 +31,7 @@
 #include "tests/support/matchers.h"
 #include "tracker/marker_image.h"
 #include "tracker/predict.h"
+#include "tracker/swapped_cameras.h"
 
 namespace limn::session {
 namespace {
@@ -502,7 +502,7 @@ TEST(Live, KnowsCamerasThatWereExchanged) {
     const Percepts& percepts = perception->watch(frames);
     EXPECT_GT(percepts.detections[0].size(), 3u);
     EXPECT_GT(percepts.detections[1].size(), 3u);
-    return swapped_cameras(world.rig, bodies, percepts.detections, percepts.captured_at);
+    return tracker::swapped_cameras(world.rig, bodies, percepts.detections, percepts.captured_at);
   };
   EXPECT_FALSE(found());
   std::swap(frames[0].image, frames[1].image);

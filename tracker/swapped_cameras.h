@@ -11,7 +11,7 @@
 #include "core/rig.h"
 #include "tracker/detection.h"
 
-namespace limn::session {
+namespace limn::tracker {
 
 /// Finds two cameras whose images come under each other's names: with these names they see a body in two
 /// places, with the names exchanged all cameras see it in one place. `detections`: of one moment, one list
@@ -20,7 +20,7 @@ namespace limn::session {
 std::optional<std::pair<std::string, std::string>> swapped_cameras(
     const Rig& rig,
     std::span<const Body> bodies,
-    std::span<const std::vector<tracker::Detection>> detections,
+    std::span<const std::vector<Detection>> detections,
     Stamp captured_at);
 
 /// Checks for swapped cameras from time to time while a session runs, until some were found.
@@ -29,7 +29,7 @@ class SwappedCamerasCheck {
   /// A message for people, once; otherwise nullopt.
   std::optional<std::string> check(const Rig& rig,
                                    std::span<const Body> bodies,
-                                   std::span<const std::vector<tracker::Detection>> detections,
+                                   std::span<const std::vector<Detection>> detections,
                                    Stamp captured_at);
   /// To be called when the rig was replaced: checks again.
   void begin_anew(Stamp at);
@@ -39,4 +39,4 @@ class SwappedCamerasCheck {
   bool has_warned_ = false;
 };
 
-}  // namespace limn::session
+}  // namespace limn::tracker

@@ -1,4 +1,4 @@
-#include "session/swapped_cameras.h"
+#include "tracker/swapped_cameras.h"
 
 #include <algorithm>
 #include <limits>
@@ -6,7 +6,7 @@
 #include "tracker/body_correspondences.h"
 #include "tracker/body_pose.h"
 
-namespace limn::session {
+namespace limn::tracker {
 namespace {
 
 constexpr double k_compare_cameras_every_s = 2;
@@ -18,16 +18,16 @@ constexpr double k_right_px = 3, k_wrong_px = 12;
 // The largest RMS residual of the bodies that several cameras see; 0 when there are none.
 double misfit_px(std::span<const Body> bodies,
                  std::span<const Imager* const> cameras,
-                 std::span<const std::vector<tracker::Detection>> detections,
+                 std::span<const std::vector<Detection>> detections,
                  Stamp captured_at) {
-  std::vector<tracker::View> views;
+  std::vector<View> views;
   for (std::size_t i = 0; i < cameras.size(); ++i) views.push_back({cameras[i], detections[i]});
   double worst = 0;
   for (const Body& body : bodies) {
     int seen_by = 0;
-    for (const tracker::View& view : views) seen_by += !tracker::correspondences(body, {&view, 1}).empty();
+    for (const View& view : views) seen_by += !correspondences(body, {&view, 1}).empty();
     if (seen_by < 2) continue;
-    const auto track = tracker::world_from_body(body, views, captured_at);
+    const auto track = world_from_body(body, views, captured_at);
     worst = std::max(worst, track ? track->rms_px : std::numeric_limits<double>::infinity());
   }
   return worst;
@@ -38,7 +38,7 @@ double misfit_px(std::span<const Body> bodies,
 std::optional<std::pair<std::string, std::string>> swapped_cameras(
     const Rig& rig,
     std::span<const Body> bodies,
-    std::span<const std::vector<tracker::Detection>> detections,
+    std::span<const std::vector<Detection>> detections,
     Stamp captured_at) {
   LIMN_CHECK(detections.size() == rig.cameras.size());
   std::vector<const Imager*> cameras;
@@ -60,7 +60,7 @@ std::optional<std::pair<std::string, std::string>> swapped_cameras(
 std::optional<std::string> SwappedCamerasCheck::check(
     const Rig& rig,
     std::span<const Body> bodies,
-    std::span<const std::vector<tracker::Detection>> detections,
+    std::span<const std::vector<Detection>> detections,
     Stamp captured_at) {
   if (has_warned_ || rig.cameras.size() < 2 ||
       seconds_between(compared_at_, captured_at) < k_compare_cameras_every_s)
@@ -80,4 +80,4 @@ void SwappedCamerasCheck::begin_anew(Stamp at) {
   compared_at_ = at;
 }
 
-}  // namespace limn::session
+}  // namespace limn::tracker
