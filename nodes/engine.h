@@ -18,10 +18,15 @@ inline constexpr std::size_t k_topics = 9;
 /// Whether each receiver gets the topic's samples through a writer of its own, so that a slow receiver delays
 /// nobody else.
 constexpr bool is_directed(Topic topic) { return topic == Topic::order || topic == Topic::answer; }
-/// Whether samples wait in the engine until take_waiting() is called, and none is lost.
+/// Whether a sample that is lost is sent again.
 constexpr bool is_reliable(Topic topic) {
   return is_directed(topic) || topic == Topic::offer || topic == Topic::setup;
 }
+/// Whether samples wait in the engine until take_waiting() is called; others are reported when they come.
+constexpr bool is_waiting(Topic topic) { return is_directed(topic) || topic == Topic::setup; }
+/// How long a program that is silent is remembered. When it is heard again within this time, what it missed
+/// is sent again; later it is met anew.
+inline constexpr double k_memory_s = 30;
 
 /// What the engine reports. The functions are called from the engine's own threads or from take_waiting(),
 /// and must return soon.
@@ -31,7 +36,7 @@ class EngineEvents {
   /// A sample has come: a struct of limn_room.idl, valid during the call.
   virtual void receive_sample(Topic topic, const void* sample, Stamp arrived_at) = 0;
   virtual void notice_departure(const Sender& sender) = 0;
-  /// Samples of reliable topics wait.
+  /// Samples wait for take_waiting().
   virtual void notice_waiting() = 0;
   /// What the engine would print: a warning or an error.
   virtual void notice_warning(const std::string& text) = 0;
@@ -59,8 +64,12 @@ class Engine {
   virtual void connect(const Sender& receiver) = 0;
   /// Forgets what a program that has gone did not take.
   virtual void forget(const Sender& receiver) = 0;
-  /// Reports what waits in reliable topics.
+  /// Reports samples that wait.
   virtual void take_waiting() = 0;
+  /// The longest time for which a program that the engine believes to be there has offered nothing. More than
+  /// k_memory_s means that it has forgotten this one, which happens when only one of them was silent, and
+  /// that the two will not meet again until this engine is closed and made again.
+  virtual double longest_silence_s() = 0;
 };
 
 /// The engine's shared library, which is loaded at the first call: the file that the environment variable

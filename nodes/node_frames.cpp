@@ -11,8 +11,9 @@
 namespace limn::nodes {
 namespace {
 
-constexpr double k_blend = 0.1;        // weight of a new time in the expected one
-constexpr double k_late_decay = 0.98;  // the largest distance from the wanted moment shrinks by it with each frame
+constexpr double k_blend = 0.1;  // weight of a new time in the expected one
+constexpr double k_late_decay =
+    0.98;  // the largest distance from the wanted moment shrinks by it with each frame
 
 cv::Mat dimmed(const cv::Mat& image, double share) {
   cv::Mat out;

@@ -1,10 +1,15 @@
 #include "nodes/room_link.h"
 
+#include <time.h>
+
 #include <algorithm>
 #include <condition_variable>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <random>
+#include <set>
+#include <shared_mutex>
 #include <thread>
 
 #include "core/log.h"
@@ -38,13 +43,20 @@ bool is_replaced(const Received& old, const Received& fresh) {
   return !one || one->camera == other->camera;
 }
 
+// Seconds on a clock that also counts while the machine sleeps.
+double seconds_with_sleep() {
+  timespec at{};
+  ::clock_gettime(CLOCK_BOOTTIME, &at);
+  return static_cast<double>(at.tv_sec) + 1e-9 * static_cast<double>(at.tv_nsec);
+}
+
 class EngineLink final : public RoomLink, private EngineEvents {
  public:
-  explicit EngineLink(Sender self, bool is_host) : self_(std::move(self)), is_host_(is_host) {}
+  explicit EngineLink(EngineOptions options) : options_(std::move(options)) {}
   ~EngineLink() override;
-  Status open(const EngineOptions& options);
+  Status open();
 
-  const Sender& self() const override { return self_; }
+  const Sender& self() const override { return options_.self; }
   Status send(const Message& message) override;
   std::vector<Received> take_messages(std::chrono::nanoseconds wait) override;
   LinkCounts counts() const override;
@@ -57,43 +69,56 @@ class EngineLink final : public RoomLink, private EngineEvents {
 
   void keep(Received received);
   void keep_offer(Received received);
+  Status write(const WireSample& sample);
   Status send_to_all_runs(const std::string& machine, const WireSample& sample);
-  void repeat_offer(const std::stop_token& stop);
+  void attend(const std::stop_token& stop);
+  void tell_engine(const std::vector<Sender>& departed, const std::vector<Sender>& arrived);
+  void repeat(const std::optional<Message>& message);
+  bool is_forgotten(double awake_s);
+  void enter_again();
 
-  const Sender self_;
-  const bool is_host_;
+  const EngineOptions options_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::vector<Received> newest_, queued_;   // best effort; reliable
-  std::map<Sender, Offer> present_;         // who is there, and its last offer
-  std::vector<Sender> departed_, arrived_;  // that the engine has not been told
-  bool is_waiting_ = false;                 // in the engine
-  Message own_offer_ = Departure{};         // none yet
+  std::vector<Received> newest_, queued_;  // best effort; reliable
+  std::set<Sender> met_;  // who is there, also those who sent an order or answer before their offer came
+  std::map<Sender, Offer> present_;               // who is there, and its last offer
+  std::vector<Sender> departed_, arrived_;        // that the engine has not been told
+  bool has_waiting_ = false;                      // in the engine
+  std::optional<Message> own_offer_, own_setup_;  // what was sent last
   LinkCounts counts_;
   std::mutex taking_;
-  std::unique_ptr<Engine> engine_;
-  std::jthread repeating_;
+  std::shared_mutex engine_mutex_;  // locked alone by who changes the pointer
+  std::unique_ptr<Engine> engine_;  // null: it could not be made again
+  std::jthread attending_;
 };
 
 EngineLink::~EngineLink() {
-  repeating_ = {};
+  attending_ = {};
   engine_.reset();  // before the members that its threads use
 }
 
-Status EngineLink::open(const EngineOptions& options) {
-  LIMN_TRY(engine_, make_engine(options, this));
-  repeating_ = std::jthread([this](const std::stop_token& stop) { repeat_offer(stop); });
+Status EngineLink::open() {
+  LIMN_TRY(engine_, make_engine(options_, this));
+  attending_ = std::jthread([this](const std::stop_token& stop) { attend(stop); });
   return {};
 }
 
 Status EngineLink::send(const Message& message) {
   LIMN_TRY_STATUS(check_message(message));
-  const WireSample sample = to_wire(message, self_);
+  const WireSample sample = to_wire(message, options_.self);
   if (is_directed(sample.topic)) return send_to_all_runs(*receiver_of(message), sample);
-  if (sample.topic == Topic::offer) {
+  if (sample.topic == Topic::offer || sample.topic == Topic::setup) {
     const std::lock_guard lock(mutex_);
-    own_offer_ = message;
+    (sample.topic == Topic::offer ? own_offer_ : own_setup_) = message;
   }
+  return write(sample);
+}
+
+Status EngineLink::write(const WireSample& sample) {
+  const std::shared_lock lock(engine_mutex_);
+  if (!engine_)
+    return error("room: expected a network, found none. It is opened again as soon as there is one.");
   return engine_->write(sample.topic, sample.sample.get());
 }
 
@@ -101,14 +126,16 @@ Status EngineLink::send_to_all_runs(const std::string& machine, const WireSample
   std::vector<Sender> runs;
   {
     const std::lock_guard lock(mutex_);
-    for (const auto& entry : present_)
-      if (entry.first.node == machine) runs.push_back(entry.first);
+    for (const Sender& sender : met_)
+      if (sender.node == machine) runs.push_back(sender);
   }
   if (runs.empty())
     return error("machine '{}': expected it in the room, found that it is not there. Start limn node on it.",
                  machine);
   Status first;
+  const std::shared_lock lock(engine_mutex_);
   for (const Sender& run : runs) {
+    if (!engine_) break;
     const Status sent = engine_->write_to(run, sample.topic, sample.sample.get());
     if (!sent && first) first = sent;
   }
@@ -119,10 +146,13 @@ std::vector<Received> EngineLink::take_messages(std::chrono::nanoseconds wait) {
   const std::lock_guard one_at_a_time(taking_);
   {
     std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, wait, [this] { return is_waiting_ || !newest_.empty() || !queued_.empty(); });
-    is_waiting_ = false;
+    changed_.wait_for(lock, wait, [this] { return has_waiting_ || !newest_.empty() || !queued_.empty(); });
+    has_waiting_ = false;
   }
-  engine_->take_waiting();
+  {
+    const std::shared_lock lock(engine_mutex_);
+    if (engine_) engine_->take_waiting();
+  }
   const std::lock_guard lock(mutex_);
   std::vector<Received> out = std::exchange(queued_, {});
   std::move(newest_.begin(), newest_.end(), std::back_inserter(out));
@@ -143,9 +173,10 @@ void EngineLink::receive_sample(Topic topic, const void* sample, Stamp arrived_a
     return;
   }
   const std::string* receiver = receiver_of(received->message);
-  if (receiver && *receiver != self_.node) return;
+  if (receiver && *receiver != options_.self.node) return;
   const std::lock_guard lock(mutex_);
   ++counts_.received;
+  if (is_directed(topic) || topic == Topic::offer) met_.insert(received->from);
   if (topic == Topic::offer)
     keep_offer(std::move(*received));
   else
@@ -153,7 +184,7 @@ void EngineLink::receive_sample(Topic topic, const void* sample, Stamp arrived_a
 }
 
 void EngineLink::keep(Received received) {
-  if (is_reliable(static_cast<Topic>(received.message.index()))) {
+  if (is_waiting(static_cast<Topic>(received.message.index()))) {
     queued_.push_back(std::move(received));
     return;
   }
@@ -166,7 +197,7 @@ void EngineLink::keep_offer(Received received) {
   const Offer& offer = std::get<Offer>(received.message);
   const auto known = present_.find(received.from);
   if (known != present_.end() && known->second == offer) return;  // a repeated one
-  if (known == present_.end() && is_host_ != offer.is_host) arrived_.push_back(received.from);
+  if (known == present_.end() && options_.is_host != offer.is_host) arrived_.push_back(received.from);
   present_[received.from] = offer;
   queued_.push_back(std::move(received));
   changed_.notify_all();
@@ -174,6 +205,7 @@ void EngineLink::keep_offer(Received received) {
 
 void EngineLink::notice_departure(const Sender& sender) {
   const std::lock_guard lock(mutex_);
+  met_.erase(sender);
   if (present_.erase(sender) == 0) return;
   departed_.push_back(sender);
   queued_.push_back({Departure{}, sender, now()});
@@ -182,7 +214,7 @@ void EngineLink::notice_departure(const Sender& sender) {
 
 void EngineLink::notice_waiting() {
   const std::lock_guard lock(mutex_);
-  is_waiting_ = true;
+  has_waiting_ = true;
   changed_.notify_all();
 }
 
@@ -194,24 +226,70 @@ void EngineLink::notice_warning(const std::string& text) {
   log_warning("room: {}", text);
 }
 
-// Runs on a thread of its own. What takes the engine long is done here, too.
-void EngineLink::repeat_offer(const std::stop_token& stop) {
+// Runs on a thread of its own: what takes the engine long, the repeated offer, and the return after a long
+// sleep.
+void EngineLink::attend(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  for (Stamp next = now() + k_offer_interval; !stop.stop_requested();) {
+  Stamp next = now() + k_offer_interval;
+  double awake_s = seconds_with_sleep();
+  while (!stop.stop_requested()) {
     changed_.wait_until(lock, stop, next, [this] { return !departed_.empty() || !arrived_.empty(); });
     const std::vector<Sender> departed = std::exchange(departed_, {}), arrived = std::exchange(arrived_, {});
-    const Message offer = now() >= next ? own_offer_ : Message(Departure{});
+    const std::optional<Message> offer = own_offer_;
     lock.unlock();
-    for (const Sender& sender : departed) engine_->forget(sender);
-    for (const Sender& sender : arrived) engine_->connect(sender);
-    if (std::holds_alternative<Offer>(offer)) {
-      const WireSample sample = to_wire(offer, self_);
-      if (const Status sent = engine_->write(sample.topic, sample.sample.get()); !sent)
-        notice_warning(sent.message());
+    tell_engine(departed, arrived);
+    if (now() >= next) {
+      next = now() + k_offer_interval;
+      repeat(offer);
+      if (is_forgotten(std::exchange(awake_s, seconds_with_sleep()))) enter_again();
     }
-    if (now() >= next) next = now() + k_offer_interval;
     lock.lock();
   }
+}
+
+void EngineLink::tell_engine(const std::vector<Sender>& departed, const std::vector<Sender>& arrived) {
+  const std::shared_lock lock(engine_mutex_);
+  if (!engine_) return;
+  for (const Sender& sender : departed) engine_->forget(sender);
+  for (const Sender& sender : arrived) engine_->connect(sender);
+}
+
+void EngineLink::repeat(const std::optional<Message>& message) {
+  if (!message) return;
+  if (const Status sent = write(to_wire(*message, options_.self)); !sent) notice_warning(sent.message());
+}
+
+// Whether others have forgotten this program while it did not run, as a laptop that sleeps, or while nobody
+// heard it.
+bool EngineLink::is_forgotten(double awake_s) {
+  constexpr double k_margin_s = 2;
+  if (seconds_with_sleep() - awake_s > k_memory_s - k_margin_s) return true;
+  const std::shared_lock lock(engine_mutex_);
+  return !engine_ || engine_->longest_silence_s() > k_memory_s + k_margin_s;
+}
+
+void EngineLink::enter_again() {
+  std::optional<Message> offer, setup;
+  {
+    const std::lock_guard alone(engine_mutex_);
+    const bool was_open = engine_ != nullptr;
+    engine_.reset();  // Only one at a time can be in a room.
+    auto made = make_engine(options_, this);
+    if (made)
+      engine_ = std::move(*made);
+    else if (was_open)
+      notice_warning(made.message());
+    const std::lock_guard lock(mutex_);
+    for (const auto& entry : std::exchange(present_, {}))
+      queued_.push_back({Departure{}, entry.first, now()});
+    met_.clear();
+    ++counts_.entries;
+    offer = own_offer_;
+    setup = own_setup_;
+    changed_.notify_all();
+  }
+  repeat(offer);
+  repeat(setup);
 }
 
 std::uint64_t random_run() {
@@ -236,8 +314,8 @@ Result<std::unique_ptr<RoomLink>> open_room_link(const RoomLinkOptions& options)
   engine.peers = options.peers;
   engine.interfaces = options.interfaces;
   engine.liveliness_s = options.liveliness_s;
-  auto link = std::make_unique<EngineLink>(engine.self, options.is_host);
-  LIMN_TRY_STATUS(link->open(engine));
+  auto link = std::make_unique<EngineLink>(std::move(engine));
+  LIMN_TRY_STATUS(link->open());
   return std::unique_ptr<RoomLink>(std::move(link));
 }
 

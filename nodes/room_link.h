@@ -32,6 +32,7 @@ struct LinkCounts {
   std::uint64_t received = 0;
   std::uint64_t refused = 0;   ///< messages whose content was not valid; they are left out
   std::uint64_t warnings = 0;  ///< the engine's; the first are printed
+  std::uint64_t entries = 1;   ///< how often the room was entered: again after a long sleep
 };
 
 /// The connection to the other machines of a room. Messages have the reliability that their comments in
@@ -43,7 +44,11 @@ class RoomLink {
   /// This program's own name and run.
   virtual const Sender& self() const = 0;
   /// Sends to all machines; ClockRequest, ClockAnswer, Order and Answer are received by the machine `to`
-  /// only. Error: the engine's message. Departure cannot be sent.
+  /// only. A program sends its Offer first, so that the others know of it, and again when it changes. Setup,
+  /// Moment and Order can be sent by a host only, Sighting by a node only; Setup, Moment and Order come to
+  /// nodes only, Sighting to the host only. Order and Answer wait up to 2 s until `to` is connected and has
+  /// taken earlier ones. Error: the content is not valid (message_check.h), nobody named `to` is there, or
+  /// the engine's message. Departure cannot be sent.
   virtual Status send(const Message& message) = 0;
   /// What has arrived since the last call; waits up to `wait` for something. Of best-effort messages only the
   /// newest of each sender (and camera) is kept. Own messages are not received.

@@ -3,6 +3,7 @@
 #include <dds/dds.h>
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
@@ -57,6 +58,7 @@ class DdsEngine final : public Engine {
   void connect(const Sender& receiver) override;
   void forget(const Sender& receiver) override;
   void take_waiting() override;
+  double longest_silence_s() override;
 
  private:
   struct Reading {
@@ -72,7 +74,7 @@ class DdsEngine final : public Engine {
   Status open_topic(Topic topic, const EngineOptions& options, dds_entity_t subscriber);
   Result<dds_entity_t> directed_writer(const Sender& receiver, Topic topic);
   void take_samples(Topic topic, dds_entity_t reader);
-  void report_departure(const limn_v1_Offer& offer);
+  void report_presence(const limn_v1_Offer& offer, const dds_sample_info_t& info);
   static void notice_data(dds_entity_t reader, void* reading);
   static void print(void* engine, const dds_log_data_t* data);
   Error failed(const char* what, dds_return_t code);
@@ -84,6 +86,8 @@ class DdsEngine final : public Engine {
   std::array<Reading, k_topics> readings_;
   std::mutex directed_mutex_;
   Directed directed_;
+  std::mutex heard_mutex_;
+  std::map<dds_instance_handle_t, Stamp> heard_;  // when each matched program offered itself last
   std::mutex log_mutex_;
   std::string last_log_;
 };
@@ -151,7 +155,7 @@ Status DdsEngine::open_topic(Topic topic, const EngineOptions& options, dds_enti
 
 void DdsEngine::notice_data(dds_entity_t reader, void* reading) {
   const auto& at = *static_cast<const Reading*>(reading);
-  if (is_reliable(at.topic))
+  if (is_waiting(at.topic))
     at.engine->events_->notice_waiting();
   else
     at.engine->take_samples(at.topic, reader);
@@ -159,7 +163,7 @@ void DdsEngine::notice_data(dds_entity_t reader, void* reading) {
 
 void DdsEngine::take_waiting() {
   for (const Reading& at : readings_)
-    if (at.reader > 0 && is_reliable(at.topic)) take_samples(at.topic, at.reader);
+    if (at.reader > 0 && is_waiting(at.topic)) take_samples(at.topic, at.reader);
 }
 
 void DdsEngine::take_samples(Topic topic, dds_entity_t reader) {
@@ -171,15 +175,38 @@ void DdsEngine::take_samples(Topic topic, dds_entity_t reader) {
     count = dds_take(reader, samples.data(), infos.data(), k_batch, k_batch);
     for (std::size_t i = 0; static_cast<int>(i) < count; ++i) {
       if (infos[i].valid_data) events_->receive_sample(topic, samples[i], arrived_at);
-      if (topic == Topic::offer && infos[i].instance_state != DDS_IST_ALIVE)
-        report_departure(*static_cast<const limn_v1_Offer*>(samples[i]));
+      if (topic == Topic::offer) report_presence(*static_cast<const limn_v1_Offer*>(samples[i]), infos[i]);
     }
     if (count > 0) dds_return_loan(reader, samples.data(), count);
   }
 }
 
-void DdsEngine::report_departure(const limn_v1_Offer& offer) {
-  events_->notice_departure({offer.node ? offer.node : "", offer.run});
+void DdsEngine::report_presence(const limn_v1_Offer& offer, const dds_sample_info_t& info) {
+  if (info.instance_state != DDS_IST_ALIVE) {
+    events_->notice_departure({offer.node ? offer.node : "", offer.run});
+  } else if (info.valid_data) {
+    const std::lock_guard lock(heard_mutex_);
+    heard_[info.publication_handle] = now();
+  }
+}
+
+double DdsEngine::longest_silence_s() {
+  constexpr std::size_t k_most = 256;
+  const dds_entity_t reader = readings_[static_cast<std::size_t>(Topic::offer)].reader;
+  std::array<dds_instance_handle_t, k_most> matched{};
+  const dds_return_t count = dds_get_matched_publications(reader, matched.data(), k_most);
+  const std::lock_guard lock(heard_mutex_);
+  const Stamp at = now();
+  std::map<dds_instance_handle_t, Stamp> heard;
+  double longest_s = 0;
+  for (std::size_t i = 0; i < std::min<std::size_t>(k_most, static_cast<std::size_t>(std::max(count, 0)));
+       ++i) {
+    const auto known = heard_.find(matched[i]);
+    heard[matched[i]] = known == heard_.end() ? at : known->second;
+    longest_s = std::max(longest_s, seconds_between(heard[matched[i]], at));
+  }
+  heard_ = std::move(heard);
+  return longest_s;
 }
 
 Status DdsEngine::write(Topic topic, const void* sample) {

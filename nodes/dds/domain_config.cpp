@@ -21,9 +21,12 @@ namespace {
 // divided: a divided one is lost with any of its parts, and strangers can disturb its assembly.
 constexpr int k_datagram_bytes = 1400, k_fragment_bytes = 1152;
 constexpr const char* k_receive_buffer = "8MiB";  // asked for; the kernel limits it to net.core.rmem_max
-constexpr std::size_t k_most_interfaces = 4;      // MAX_XMIT_CONNS of Cyclone DDS
-constexpr int k_last_participant = 60;            // programs on one machine; the domain has ports for 119
-constexpr int k_peer_participants = 4;            // among them, those that machines without multicast find
+// How much a writer keeps that its receivers have not confirmed, before it waits. It does not shrink, because
+// a setup must not wait for a machine that was switched off.
+constexpr const char* k_unconfirmed = "8MiB";
+constexpr std::size_t k_most_interfaces = 4;  // MAX_XMIT_CONNS of Cyclone DDS
+constexpr int k_last_participant = 60;        // programs on one machine; the domain has ports for 119
+constexpr int k_peer_participants = 4;        // among them, those that machines without multicast find
 // Ports of a participant (DDSI-RTPS 2.5, 9.6.2).
 constexpr int k_port_base = 7400, k_domain_gain = 250, k_participant_gain = 2, k_unicast_offset = 10;
 
@@ -142,9 +145,7 @@ std::string peer_lines(const std::vector<PeerAddresses>& peers, Family family, i
 }  // namespace
 
 Result<std::string> domain_config(const EngineOptions& options) {
-  // A machine that was away is found again within the interval; what it missed is sent again within the
-  // lease, and later it is met anew.
-  constexpr double k_announcement_s = 0.5, k_least_lease_s = 2, k_lease_of_liveliness = 6;
+  constexpr double k_announcement_s = 0.5;  // a machine that comes is found within this time
   const Interfaces own = own_interfaces();
   LIMN_TRY(const std::vector<std::string> used, used_interfaces(options, own));
   std::vector<PeerAddresses> peers;
@@ -153,7 +154,6 @@ Result<std::string> domain_config(const EngineOptions& options) {
     peers.push_back(std::move(addresses));
   }
   LIMN_TRY(const Family family, used_family(peers, used, own));
-  const double lease_s = std::max(k_least_lease_s, k_lease_of_liveliness * options.liveliness_s);
   return fmt::format(
       "<CycloneDDS><Domain Id=\"any\"><General><Transport>{}</Transport><AllowMulticast>{}</AllowMulticast>"
       "<MaxMessageSize>{}B</MaxMessageSize><MaxRexmitMessageSize>{}B</MaxRexmitMessageSize>"
@@ -163,12 +163,15 @@ Result<std::string> domain_config(const EngineOptions& options) {
       "<ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>{}</"
       "Discovery>"
       "<Internal><SocketReceiveBufferSize max=\"{}\"/>"
-      "<SynchronousDeliveryPriorityThreshold>1</SynchronousDeliveryPriorityThreshold></Internal>"
+      "<SynchronousDeliveryPriorityThreshold>1</SynchronousDeliveryPriorityThreshold>"
+      "<Watermarks><WhcHigh>{}</WhcHigh><WhcHighInit>{}</WhcHighInit><WhcAdaptive>false</WhcAdaptive></"
+      "Watermarks>"
+      "</Internal>"
       "</Domain></CycloneDDS>",
       family == Family::v4 ? "udp" : "udp6", peers.empty() ? "default" : "false", k_datagram_bytes,
       k_datagram_bytes, k_fragment_bytes, interface_lines(used, family, own), options.keys.name,
-      k_announcement_s * 1000, lease_s * 1000, k_last_participant, peer_lines(peers, family, options.domain),
-      k_receive_buffer);
+      k_announcement_s * 1000, k_memory_s * 1000, k_last_participant,
+      peer_lines(peers, family, options.domain), k_receive_buffer, k_unconfirmed, k_unconfirmed);
 }
 
 }  // namespace limn::nodes
