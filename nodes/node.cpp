@@ -24,6 +24,7 @@ constexpr auto k_message_wait = std::chrono::milliseconds(20);
 constexpr double k_fade_s = 0.4;  // after the host has gone, which is noticed half a second later
 constexpr double k_health_every_s = 0.2;
 constexpr double k_monitors_every_s = 1;
+constexpr double k_try_again_s = 2;    // after a setup could not be loaded
 constexpr double k_clock_limit_s = 3;  // for the first comparison of the clocks
 
 // What the node does between messages, on the thread of the OpenGL context.
@@ -48,7 +49,7 @@ class NodeLoop {
     offer_monitors();
     room_->wait(k_message_wait);
     note_host();
-    if (auto setup = room_->take_setup(); setup && host_) loader_.load(*setup, *host_);
+    load_setup();
     if (auto loaded = loader_.take_loaded()) begin(std::move(*loaded));
     carry_out_orders();
     if (const auto moment = room_->take_moment()) show(*moment);
@@ -76,6 +77,7 @@ class NodeLoop {
     const std::optional<Machine> host = room_->host();
     if (host && (!host_ || host_->sender.run != host->sender.run)) greet(*host);
     if (host_ && !host) {
+      setup_.reset();
       log_warning("node: the host {} has gone; the light fades out until it is back", host_->sender.node);
       gone_at_ = now();
     }
@@ -91,9 +93,20 @@ class NodeLoop {
       log_info("node: {} is the host", host.sender.node);
   }
 
+  // The newest setup. One that could not be loaded is tried again.
+  void load_setup() {
+    if (auto setup = room_->take_setup()) {
+      setup_ = std::move(*setup);
+      load_at_ = now();
+    }
+    if (!host_ || !setup_ || !load_at_ || now() < *load_at_) return;
+    loader_.load(*setup_, *host_);
+    load_at_.reset();
+  }
+
   void begin(Result<LoadedSetup> loaded) {
     if (loaded && host_ && loaded->run != host_->sender.run) return;  // its host has gone
-    problem_.clear();
+    const std::string problem_before = std::exchange(problem_, {});
     frames_.reset();
     auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)
                          : Result<std::unique_ptr<NodeFrames>>(loaded.error());
@@ -102,7 +115,9 @@ class NodeLoop {
       gone_at_.reset();
       return;
     }
+    load_at_ = shifted(now(), k_try_again_s);
     problem_ = frames.message();
+    if (problem_ == problem_before) return;
     log_warning("node: {}", problem_);
   }
 
@@ -158,6 +173,8 @@ class NodeLoop {
   std::optional<Machine> host_;
   std::vector<Room::ReceivedOrder> orders_;  // that wait
   std::optional<Stamp> waits_since_;
+  std::optional<Setup> setup_;    // the host's last
+  std::optional<Stamp> load_at_;  // when it is to be loaded
   std::unique_ptr<NodeFrames> frames_;
   std::string problem_;           // why there are no frames
   std::optional<Stamp> gone_at_;  // when the host was found to have gone, while the light fades

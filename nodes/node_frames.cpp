@@ -4,6 +4,7 @@
 #include <array>
 #include <thread>
 
+#include "core/median.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
 #include "session/recording.h"
@@ -11,7 +12,7 @@
 namespace limn::nodes {
 namespace {
 
-constexpr double k_blend = 0.1;  // weight of a new time in the expected one
+constexpr std::size_t k_draw_times = 15;  // whose median is reported: single slow frames do not count
 constexpr double k_late_decay =
     0.98;  // the largest distance from the wanted moment shrinks by it with each frame
 
@@ -44,7 +45,8 @@ void NodeFrames::show(const Moment& moment, const std::optional<ClockEstimate>& 
   if (moment.setup != setup_.revision) return;
   const Stamp begun = now();
   for (Output& output : outputs_) output.image = drawer_->image(moment.frame, output.projector);
-  draw_ms_ += k_blend * (milliseconds_since(begun) - draw_ms_);
+  draw_ms_.push_back(milliseconds_since(begun));
+  if (draw_ms_.size() > k_draw_times) draw_ms_.pop_front();
 
   const Stamp wanted = clock ? clock->to_local(moment.frame.shown_at) : now();
   std::vector<Output*> in_order;
@@ -93,7 +95,7 @@ void NodeFrames::dim(double share) {
 void NodeFrames::report(Health* health) const {
   health->shown = shown_;
   health->missed = missed_;
-  health->draw_ms = draw_ms_;
+  health->draw_ms = median(std::vector<double>(draw_ms_.begin(), draw_ms_.end()));
   health->late_ms = late_ms_;
   for (const Output& output : outputs_) {
     health->latency_s = std::max(health->latency_s, output.schedule.latency_s());

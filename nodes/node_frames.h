@@ -1,5 +1,6 @@
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,7 +54,8 @@ class NodeFrames {
   std::unique_ptr<session::FrameDrawer> drawer_;
   std::vector<Output> outputs_;
   std::uint64_t shown_ = 0, missed_ = 0;
-  double draw_ms_ = 0, late_ms_ = 0;
+  std::deque<double> draw_ms_;  // the last ones
+  double late_ms_ = 0;
 };
 
 /// The first line of the log that NodeFrames::show writes.

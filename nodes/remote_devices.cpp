@@ -12,6 +12,7 @@ namespace limn::nodes {
 namespace {
 
 constexpr double k_open_limit_s = 10, k_show_limit_s = 2, k_image_limit_s = 5;
+constexpr double k_most_lead_s = 0.1;
 constexpr double k_network_s = 0.004;  // from a description's sending to the node's drawing, for most frames
 
 // Error: the machine is not there, or cannot work with this one.
@@ -58,7 +59,10 @@ Result<Stamp> RemoteDisplay::show_eyes(const EyeImages&) {
   LIMN_TRY(const Machine node, node_of(*room_, config_.host, config_.name));
   if (!node.health) return error("{}: expected word from {}, found none yet.", config_.name, config_.host);
   if (!node.health->problems.empty()) return error("{}: {}", config_.host, node.health->problems.front());
-  return shifted(now(), k_network_s + 1e-3 * node.health->draw_ms + node.health->latency_s);
+  // A node that draws slower than this shows its frames late. If all waited for it, it could show fewer
+  // still.
+  return shifted(now(),
+                 std::min(k_most_lead_s, k_network_s + 1e-3 * node.health->draw_ms + node.health->latency_s));
 }
 
 Result<std::unique_ptr<RemoteCamera>> RemoteCamera::open(Room* room, const device::CameraConfig& config) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <thread>
 
 #include "core/log.h"
@@ -37,22 +38,33 @@ Result<std::unique_ptr<RoomHost>> RoomHost::open(Room* room,
     if (find_named(setup->rig.projectors, display.name)) out->projectors_.push_back(display.name);
   }
   for (const device::CameraConfig& camera : cameras) out->nodes_.insert(camera.host);
-  LIMN_TRY_STATUS(out->send_setup(*setup));
-  LIMN_TRY(setup->rig, load_rig(work / "setup-1/rig"));
+  const fs::path folder = out->folder_of(out->revisions_);
+  LIMN_TRY_STATUS(out->send_setup(out->revisions_, shared_files(files, *setup, folder)));
+  LIMN_TRY(setup->rig, load_rig(folder / "rig"));
   return out;
 }
 
-Status RoomHost::send_setup(const session::SessionSetup& setup) {
-  ++setup_.revision;
-  const fs::path folder = work_ / fmt::format("setup-{}", setup_.revision);
+fs::path RoomHost::folder_of(std::uint64_t revision) const {
+  return work_ / fmt::format("setup-{}", revision);
+}
+
+Result<std::vector<SharedFile>> RoomHost::shared_files(FileOffer* files,
+                                                       const session::SessionSetup& setup,
+                                                       const fs::path& folder) {
   LIMN_TRY_STATUS(session::save_setup(setup, folder));
-  LIMN_TRY(setup_.files, files_->share(folder));
+  return files->share(folder);
+}
+
+Status RoomHost::send_setup(std::uint64_t revision, Result<std::vector<SharedFile>> files) {
+  if (!files) return files.error();
+  setup_.revision = revision;
+  setup_.files = std::move(*files);
   setup_.devices = devices_;
   return room_->send(setup_);
 }
 
 void RoomHost::note_description(const session::FrameDescription& frame) {
-  Moment moment{setup_.revision, frame};
+  Moment moment{revisions_, frame};
   moment.frame.number = ++frames_;  // a composer counts anew after a change of the scene
   if (const Status sent = room_->send(moment); !sent) log_warning("room: {}", sent.message());
 }
@@ -77,10 +89,18 @@ void RoomHost::apply_edits(const session::SessionMoment& moment) {
 
 void RoomHost::publish_state(const session::SessionMoment& moment) {
   if (log_.is_open() && moment.shown) log_images(moment.session, moment.at);
-  if (moment.session.scenes() == scenes_) return;
+  if (sharing_.valid() && sharing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
+    if (const Status sent = send_setup(revisions_, sharing_.get()); !sent)
+      moment.session.warn(moment.at, fmt::format("the nodes did not get the change: {}", sent.message()));
+  }
+  if (sharing_.valid() || moment.session.scenes() == scenes_) return;
+  // Frames are already made for the new setup; nodes wait for it with their last images.
   scenes_ = moment.session.scenes();
-  if (const Status sent = send_setup(moment.session.setup()); !sent)
-    moment.session.warn(moment.at, fmt::format("the nodes did not get the change: {}", sent.message()));
+  ++revisions_;
+  sharing_ = std::async(std::launch::async,
+                        [files = files_, setup = moment.session.setup(), folder = folder_of(revisions_)] {
+                          return shared_files(files, setup, folder);
+                        });
 }
 
 void RoomHost::log_images(const session::Session& session, Stamp at) {

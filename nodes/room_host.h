@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <future>
 #include <memory>
 #include <set>
 #include <string>
@@ -46,7 +48,12 @@ class RoomHost final : public session::SessionClient {
         work_(std::move(work)),
         log_(std::move(log)) {}
   void log_images(const session::Session& session, Stamp at);
-  Status send_setup(const session::SessionSetup& setup);
+  // Copies, lists and hashes the files of a setup, on any thread.
+  static Result<std::vector<SharedFile>> shared_files(FileOffer* files,
+                                                      const session::SessionSetup& setup,
+                                                      const std::filesystem::path& folder);
+  Status send_setup(std::uint64_t revision, Result<std::vector<SharedFile>> files);
+  std::filesystem::path folder_of(std::uint64_t revision) const;
 
   Room* room_;
   FileOffer* files_;
@@ -56,10 +63,12 @@ class RoomHost final : public session::SessionClient {
   std::vector<std::string> projectors_;  // that nodes have
   Setup setup_;
   std::uint64_t frames_ = 0;
-  int scenes_ = 1;                  // Session::scenes() of the setup that was sent
-  std::set<std::string> nodes_;     // that the session's devices are plugged into
-  std::set<std::string> absent_;    // those that cannot be heard now
-  std::set<std::string> problems_;  // that were reported and hold still
+  std::uint64_t revisions_ = 1;
+  std::future<Result<std::vector<SharedFile>>> sharing_;  // for the newest revision
+  int scenes_ = 1;                                        // Session::scenes() of the setup that was sent
+  std::set<std::string> nodes_;                           // that the session's devices are plugged into
+  std::set<std::string> absent_;                          // those that cannot be heard now
+  std::set<std::string> problems_;                        // that were reported and hold still
 };
 
 /// Waits for a moment for a host that is in the room already. Error: there is one; it is named.
