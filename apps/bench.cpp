@@ -11,8 +11,8 @@
 namespace limn::apps {
 
 Status run_bench(const BenchOptions& options) {
-  constexpr std::array k_names = {"tracker", "id",         "calib",  "solve", "projector",
-                                  "live",    "prediction", "remote", "tablet"};
+  constexpr std::array k_names = {"tracker", "id",         "calib",  "solve",  "projector",
+                                  "live",    "prediction", "remote", "tablet", "room"};
   if (std::find(k_names.begin(), k_names.end(), options.name) == k_names.end())
     return usage_error("bench: expected {}, found '{}'.", fmt::join(k_names, ", "), options.name);
   std::error_code problem;

@@ -278,7 +278,7 @@ void add_bench(CLI::App& app, Run& run) {
   command
       ->add_option(
           "name", options->name,
-          "Benchmark to run: tracker, id, calib, solve, projector, live, prediction, remote or tablet; "
+          "Benchmark to run: tracker, id, calib, solve, projector, live, prediction, remote, tablet or room; "
           "arguments after it are passed on to it")
       ->required();
   command->prefix_command();

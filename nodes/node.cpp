@@ -147,7 +147,9 @@ class NodeLoop {
   void fade() {
     const double share = 1 - seconds_between(*gone_at_, now()) / k_fade_s;
     if (frames_) frames_->dim(share);
-    if (share <= 0) gone_at_.reset();
+    if (share > 0) return;
+    gone_at_.reset();
+    log_info("node: the light is out");
   }
 
   void report() {

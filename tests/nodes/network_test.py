@@ -131,13 +131,13 @@ def images_are_the_hosts(machines):
     """Every image that a node shows is the host's, and nearly all frames arrive."""
     for node in NODES:
         machines.start_node(node)
-    host = machines.start_host(20)
+    host = machines.start_host(12)
     assert host.wait(60) == 0, "the host failed"
     machines.end()
     wanted = fingerprints(machines.folder / "host/frames.csv")
     for node in NODES:
         rows = shown(machines.folder / f"{node}-0/shown.csv")
-        assert len(rows) > 100, f"{node} showed {len(rows)} images"
+        assert len(rows) > 30, f"{node} showed {len(rows)} images"
         wrong = [row["frame"] for row in rows if wanted[row["frame"], row["projector"]] != row["fingerprint"]]
         assert not wrong, f"{node}: {len(wrong)} of {len(rows)} images differ from the host's: {wrong[:5]}"
         late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows[10:])
@@ -149,8 +149,8 @@ def a_killed_node_is_back(machines):
     """kill -9 of a node: the host goes on, and the node shows images at most 3 s after its restart."""
     killed = machines.start_node("left")
     machines.start_node("right")
-    host = machines.start_host(25)
-    time.sleep(10)
+    host = machines.start_host(16)
+    time.sleep(7)
     killed.kill()
     time.sleep(2)
     restarted = time.time()
@@ -166,6 +166,58 @@ def a_killed_node_is_back(machines):
     assert "left is not in the room" in notes and "left is in the room" in notes, notes[-2000:]
 
 
+def wait_for(limit_s, condition, what):
+    begun = time.time()
+    while not condition():
+        assert time.time() - begun < limit_s, f"{what}: not within {limit_s} s"
+        time.sleep(0.02)
+    return time.time() - begun
+
+
+def rows_in(path):
+    return path.read_text().count("\n") - 1 if path.exists() else 0
+
+
+def the_host_is_killed(machines):
+    """kill -9 of the host: the nodes' light is out soon; a new host finds its nodes."""
+    for node in NODES:
+        machines.start_node(node)
+    host = machines.start_host(60)
+    logs = {node: machines.folder / f"{node}.log" for node in NODES}
+    shown_by = {node: machines.folder / f"{node}-0/shown.csv" for node in NODES}
+    wait_for(30, lambda: all(rows_in(path) > 10 for path in shown_by.values()), "both nodes show images")
+    killed_at = time.time()
+    host.kill()
+    wait_for(5, lambda: all("the light is out" in log.read_text() for log in logs.values()), "the light is out")
+    dark_s = time.time() - killed_at
+    before = {node: rows_in(path) for node, path in shown_by.items()}
+    machines.start_host(60, "host-2")
+    back_s = wait_for(20, lambda: all(rows_in(path) > before[node] for node, path in shown_by.items()),
+                      "the nodes show the new host's images")
+    print(f"the light was out {dark_s:.1f} s after the host was killed, and back {back_s:.1f} s after its start")
+    machines.end()
+    assert dark_s < 1.5, dark_s
+
+
+def a_link_is_pulled(machines):
+    """A node without network is taken over by the other; it shows images again when it is plugged in."""
+    for node in NODES:
+        machines.start_node(node)
+    machines.start_host(60)
+    left = machines.folder / "left-0/shown.csv"
+    wait_for(30, lambda: rows_in(left) > 10, "the node shows images")
+    machines.network.plug("left", False)
+    log = machines.folder / "host.log"
+    gone_s = wait_for(5, lambda: "left is not in the room" in log.read_text(), "the host misses the node")
+    time.sleep(2)
+    before = rows_in(left)
+    machines.network.plug("left", True)
+    back_s = wait_for(15, lambda: rows_in(left) > before + 1, "the node shows images again")
+    print(f"the node was missed {gone_s:.1f} s after its link was pulled, and showed images {back_s:.1f} s after it was "
+          f"plugged in (the log is written once a second)")
+    machines.end()
+
+
 def a_second_host_is_refused(machines):
     machines.start_host(12)
     time.sleep(4)
@@ -177,7 +229,8 @@ def a_second_host_is_refused(machines):
     machines.end()
 
 
-SCENARIOS = [images_are_the_hosts, a_killed_node_is_back, a_second_host_is_refused]
+SCENARIOS = [images_are_the_hosts, a_killed_node_is_back, the_host_is_killed, a_link_is_pulled,
+             a_second_host_is_refused]
 
 
 def main():
