@@ -12,6 +12,7 @@
 namespace limn::nodes {
 namespace {
 
+constexpr double k_farthest_s = 0.25;
 constexpr std::size_t k_draw_times = 15;  // whose median is reported: single slow frames do not count
 constexpr double k_late_decay =
     0.98;  // the largest distance from the wanted moment shrinks by it with each frame
@@ -48,7 +49,9 @@ void NodeFrames::show(const Moment& moment, const std::optional<ClockEstimate>& 
   draw_ms_.push_back(milliseconds_since(begun));
   if (draw_ms_.size() > k_draw_times) draw_ms_.pop_front();
 
-  const Stamp wanted = clock ? clock->to_local(moment.frame.shown_at) : now();
+  // A moment that is farther away comes from a clock that is not known yet, or has stepped.
+  const Stamp wanted =
+      clock ? std::min(clock->to_local(moment.frame.shown_at), shifted(now(), k_farthest_s)) : now();
   std::vector<Output*> in_order;
   for (Output& output : outputs_) in_order.push_back(&output);
   std::ranges::sort(in_order, {}, [&](const Output* output) { return output->schedule.call_at(wanted); });
