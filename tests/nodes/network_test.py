@@ -64,6 +64,25 @@ class Network:
             run("ip", "netns", "del", namespace, check=False)
 
 
+class NetworkWithoutMulticast(Network):
+    """A switch that blocks multicast."""
+
+    def __init__(self, machines):
+        super().__init__(machines)
+        for namespace in self.names.values():
+            run("ip", "-n", namespace, "link", "set", "eth0", "multicast", "off")
+
+
+class NetworkOfVersion6(Network):
+    """A network with IPv6 alone."""
+
+    def __init__(self, machines):
+        super().__init__(machines)
+        for number, namespace in enumerate(self.names.values(), 1):
+            run("ip", "-n", namespace, "addr", "flush", "dev", "eth0")
+            run("ip", "-n", namespace, "addr", "add", f"fd77::{number}/64", "dev", "eth0", "nodad")
+
+
 class LossyNetwork:
     """As Network, with a relay instead of a bridge, which drops packets and delays each by another time."""
 
@@ -146,9 +165,9 @@ class Machines:
         self.programs.append(program)
         return program
 
-    def start_node(self, name, run_number=0, clock_ahead_s=100):
+    def start_node(self, name, run_number=0, clock_ahead_s=100, extra=()):
         return self.start(name, [self.limn, "node", "--join", "studio", "--name", name, "--out",
-                                 self.folder / f"{name}-{run_number}"], clock_ahead_s)
+                                 self.folder / f"{name}-{run_number}", *extra], clock_ahead_s)
 
     def start_host(self, seconds, out="host", extra=()):
         return self.start("host", [self.limn, "live", "--room", "studio", "--name", "host", "--devices",
@@ -254,6 +273,33 @@ def nobody_freezes_on_a_bad_network(machines):
 nobody_freezes_on_a_bad_network.network = LossyNetwork
 
 
+def machines_meet_without_multicast(machines):
+    """With the host's address as a peer of the nodes."""
+    for node in NODES:
+        machines.start_node(node, extra=["--peer", f"{PREFIX}1"])
+    machines.start_host(0)
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    print(f"images {wait_for(60, lambda: all(rows_in(path) > 5 for path in paths), 'the nodes show images'):.1f} s after "
+          "the start")
+    machines.end()
+
+
+machines_meet_without_multicast.network = NetworkWithoutMulticast
+
+
+def machines_meet_by_ipv6(machines):
+    for node in NODES:
+        machines.start_node(node)
+    machines.start_host(0)
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    print(f"images {wait_for(60, lambda: all(rows_in(path) > 5 for path in paths), 'the nodes show images'):.1f} s after "
+          "the start")
+    machines.end()
+
+
+machines_meet_by_ipv6.network = NetworkOfVersion6
+
+
 def a_killed_node_is_back(machines):
     """kill -9 of a node: the host goes on, and the node shows images at most 3 s after its restart."""
     killed = machines.start_node("left")
@@ -326,7 +372,8 @@ def a_second_host_is_refused(machines):
     machines.end()
 
 
-SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, a_killed_node_is_back, the_host_is_killed, a_link_is_pulled,
+SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_meet_without_multicast,
+             machines_meet_by_ipv6, a_killed_node_is_back, the_host_is_killed, a_link_is_pulled,
              a_second_host_is_refused]
 
 
