@@ -33,6 +33,7 @@ class Glasses {
   #view = null;
   #sent_at = 0;
   #is_tracking = true;
+  #is_fetching = false;
   #place = null; // the newest message `glasses`
   #parts = null; // the newest message `glasses_parts`
   #problem = ""; // why Limn refused something
@@ -59,11 +60,17 @@ class Glasses {
     return this.#place?.markers ?? [];
   }
 
+  /** Whether parts are known that the page does not have yet. */
+  get is_fetching() {
+    return this.#is_fetching;
+  }
+
   /** What is wrong, or what to do, as a sentence; empty: all is well. */
   get words() {
     if (!this.is_on) return "";
     if (this.#link.status !== "connected") return "No connection to Limn. Trying again …";
     if (this.#problem) return this.#problem;
+    if (this.#place?.state === "asleep") return this.#place.why;
     if (!this.#is_tracking) return "The glasses have lost their tracking. Look round slowly, in good light.";
     if (!this.#place) return "Waiting for Limn …";
     return this.#place.state === "registered" ? "" : this.#place.why;
@@ -134,6 +141,9 @@ class Glasses {
     this.#view?.close();
     this.#view = null;
     this.#problem = "";
+    this.#sent_at = 0;
+    this.#is_tracking = true;
+    this.#is_fetching = false;
     this.#stage.rest(false);
     this.on_change();
   }
@@ -180,6 +190,9 @@ class Glasses {
       slots: this.#session.state?.slots ?? [],
       words: this.words,
     });
+    if (this.#view.is_fetching === this.#is_fetching) return;
+    this.#is_fetching = this.#view.is_fetching;
+    this.on_change();
   }
 
   #send_pose(time, { orientation: q, position: p }) {
@@ -217,6 +230,11 @@ function make_choice(owner, label, values, chosen, choose) {
   return h("div", { class: "choices", role: "group", "aria-label": label }, ...buttons);
 }
 
+function words_when_registered(owner) {
+  const known = "The glasses know where they are in the room.";
+  return owner.is_fetching ? `${known} The parts are being fetched …` : known;
+}
+
 export function make_glasses(session, stage) {
   const owner = new Glasses(session, stage);
   const why = h("p", { role: "status", class: "soft", id: "glasses-why" });
@@ -235,7 +253,7 @@ export function make_glasses(session, stage) {
   by_id("window").append(h("div", { class: "stack" }, h("h3", {}, "Glasses"), why, choice, marker, button));
   owner.on_change = () => {
     set_text(words, owner.is_on ? "Take the glasses off" : "Put the glasses on");
-    set_text(why, owner.is_on ? owner.words || "The glasses know where they are in the room." : "");
+    set_text(why, owner.is_on ? owner.words || words_when_registered(owner) : "");
     why.dataset.state = owner.state;
     marker.hidden = owner.markers.length < 2;
     if (marker.options.length !== owner.markers.length)
@@ -243,9 +261,11 @@ export function make_glasses(session, stage) {
   };
   button.addEventListener("click", () => {
     if (owner.is_on) return owner.take_off();
+    button.disabled = true; // until the glasses have started
     owner
       .put_on()
-      .catch((refusal) => set_text(why, k_refusals[refusal.name] ?? `The glasses did not start: ${refusal.message}`));
+      .catch((refusal) => set_text(why, k_refusals[refusal.name] ?? `The glasses did not start: ${refusal.message}`))
+      .finally(() => (button.disabled = false));
   });
   const check = async () => {
     const reason = await why_no_glasses();

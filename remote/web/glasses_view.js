@@ -184,28 +184,35 @@ async function fetched(path) {
 class MeshStore {
   #gl;
   #all = new Map();
+  #fetching = new Set(); // entries on their way
   problem = ""; // why one could not be fetched
   constructor(gl) {
     this.#gl = gl;
+  }
+  get is_fetching() {
+    return this.#fetching.size > 0;
   }
   /** The meshes on the GPU; an empty list while they are on their way. */
   of(path) {
     if (!this.#all.has(path)) {
       const entry = { meshes: [] };
       this.#all.set(path, entry);
+      this.#fetching.add(entry);
       fetched(path)
         .then((answer) => answer.arrayBuffer())
         .then(read_glb)
         .then((meshes) => {
           if (this.#all.get(path) === entry) entry.meshes = meshes.map((mesh) => upload_mesh(this.#gl, mesh));
         })
-        .catch((problem) => (this.problem = `A part could not be fetched: ${problem.message}`));
+        .catch((problem) => (this.problem = `A part could not be fetched: ${problem.message}`))
+        .finally(() => this.#fetching.delete(entry));
     }
     return this.#all.get(path).meshes;
   }
   clear() {
     for (const { meshes } of this.#all.values()) for (const mesh of meshes) delete_mesh(this.#gl, mesh);
     this.#all.clear();
+    this.#fetching.clear();
     this.problem = "";
   }
 }
@@ -416,6 +423,7 @@ export class GlassesView {
   #words_quad;
   #words = "";
   #scene = -1;
+  #lit_scene = -1; // the scene whose projectors have been fetched
 
   /** Makes a session's layer. Throws an Error whose message can be shown. */
   static async open(xr) {
@@ -452,6 +460,11 @@ export class GlassesView {
   close() {
     this.#meshes.clear();
     this.#gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  /** Whether something that belongs to the picture is still on its way. */
+  get is_fetching() {
+    return this.#meshes.is_fetching || this.#lit_scene !== this.#scene;
   }
 
   /**
@@ -499,7 +512,8 @@ export class GlassesView {
     fetched("/glasses/light.json")
       .then((answer) => answer.json())
       .then((light) => this.#scene === scene && this.#light.set(light))
-      .catch((problem) => (this.#meshes.problem = `The projectors could not be fetched: ${problem.message}`));
+      .catch((problem) => (this.#meshes.problem = `The projectors could not be fetched: ${problem.message}`))
+      .finally(() => this.#scene === scene && (this.#lit_scene = scene));
   }
 
   // The depth of real things, where the device measures it; null: it does not.

@@ -1,22 +1,23 @@
-// Runs before the page, after iwer: emulated glasses that follow a path in time, and what the tests ask of them.
+// Runs before the page, after iwer: emulated glasses, and what the tests ask of them. Time stands still for them between two
+// calls of step(): a frame is drawn when one is asked for, so that a slow machine measures the same as a fast one.
 (() => {
   const native_frame = window.requestAnimationFrame.bind(window);
+  const k_clock_offset_s = 1234.5; // of the page's clock against the session's
   let path = null, // of web_glasses_room
-    walk = { at_unix_s: Infinity, from_s: 0, until_s: 0 },
+    clock_s = k_clock_offset_s,
+    device_frame = null, // iwer's next frame
     xr = null,
     layer = null,
     gl = null;
-  const traffic = { frames: 0, sent: 0, received: 0, largest: 0 },
+  const traffic = { frames: 0, sent: 0, others: 0, largest: { glasses: 0, glasses_parts: 0 } }, // bytes
     places = [];
 
   const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true, fovy: (55 * Math.PI) / 180, ipd: 0.063 });
   device.installRuntime({ forceInstall: true });
 
-  // Where the odometry believes the head to be.
-  const move_to = (unix_s) => {
-    if (!path) return;
-    const at_s = Math.min(Math.max(unix_s - walk.at_unix_s + walk.from_s, walk.from_s), walk.until_s);
-    const at = Math.min(at_s / path.step_s, path.poses.length - 1.001),
+  // Where the odometry believes the head to be at a moment of the walk.
+  const move_to = (at_s) => {
+    const at = Math.min(Math.max(at_s / path.step_s, 0), path.poses.length - 1.001),
       i = Math.floor(at),
       share = at - i;
     const [a, b] = [path.poses[i], path.poses[i + 1]],
@@ -25,27 +26,33 @@
     device.quaternion.set(...[1, 2, 3, 0].map((k) => mixed[k] / length));
     device.position.set(...mixed.slice(4));
   };
-  // The head stands where it is at the frame's own time, which iwer gets from performance.now().
-  window.requestAnimationFrame = (callback) =>
-    native_frame((time) => {
-      const now = performance.now();
-      move_to((performance.timeOrigin + now) / 1000);
-      performance.now = () => now;
-      try {
-        callback(time);
-      } finally {
-        delete performance.now;
-      }
-    });
+  // iwer's frames wait for draw_frame(); others, of the page itself, are drawn as always.
+  window.requestAnimationFrame = (callback) => {
+    if (callback.name !== "onDeviceFrame") return native_frame(callback);
+    device_frame = callback;
+    return -1;
+  };
+  // Draws a frame, whose time iwer gets from performance.now().
+  const draw_frame = () =>
+    new Promise((done) =>
+      native_frame(() => {
+        const draw = device_frame,
+          time = 1000 * clock_s;
+        device_frame = null;
+        performance.now = () => time;
+        try {
+          draw?.(time);
+        } finally {
+          delete performance.now;
+        }
+        ++traffic.frames;
+        done();
+      }),
+    );
 
   const request = navigator.xr.requestSession.bind(navigator.xr);
   navigator.xr.requestSession = async (...given) => {
     xr = await request(...given);
-    const count = () => {
-      ++traffic.frames;
-      xr.requestAnimationFrame(count);
-    };
-    xr.requestAnimationFrame(count);
     return xr;
   };
   const Layer = window.XRWebGLLayer;
@@ -60,12 +67,11 @@
     constructor(...given) {
       super(...given);
       this.addEventListener("message", ({ data }) => {
+        const message = typeof data === "string" ? JSON.parse(data) : { type: "image" };
         const bytes = data.length ?? data.byteLength;
-        traffic.received += bytes;
-        traffic.largest = Math.max(traffic.largest, bytes);
-        if (typeof data !== "string") return;
-        const message = JSON.parse(data);
-        if (message.type === "glasses") places.push({ unix_s: Date.now() / 1000, ...message });
+        if (message.type in traffic.largest) traffic.largest[message.type] = Math.max(traffic.largest[message.type], bytes);
+        else traffic.others += bytes;
+        if (message.type === "glasses") places.push(message);
       });
     }
     send(data) {
@@ -78,15 +84,21 @@
   window.limn_glasses = {
     device,
     places,
-    walk_on(given, at_unix_s, from_s, until_s) {
+    set_path: (given) => {
       path = given;
-      walk = { at_unix_s, from_s, until_s };
     },
-    traffic: () => ({ ...traffic }),
+    // The session's clock is now_s, and the person is at at_s of the walk. Returns the newest state that the page was told.
+    async step(now_s, at_s) {
+      clock_s = now_s + k_clock_offset_s;
+      move_to(at_s);
+      await draw_frame();
+      return places.at(-1)?.state ?? "none";
+    },
+    traffic: () => structuredClone(traffic),
 
-    // The pixels of each eye that the page has drawn in its next frame, as web_glasses_room's masks, first row first.
+    // The pixels of each eye that the page draws in a frame, as web_glasses_room's masks, first row first.
     capture: () =>
-      new Promise((done) =>
+      new Promise((done) => {
         xr.requestAnimationFrame((time, frame) => {
           const eyes = [];
           for (const view of layer_views(frame)) {
@@ -108,8 +120,9 @@
             eyes.push({ width, height, bits, eye: view.eye, projection: [...view.projectionMatrix], feed_from_view, world_from_feed });
           }
           done(eyes);
-        }),
-      ),
+        });
+        draw_frame();
+      }),
     // The left hand stands before the face.
     raise_a_hand() {
       device.primaryInputMode = "hand";
