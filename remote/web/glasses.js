@@ -7,6 +7,13 @@ const k_parts = [
   ["rest", "Not projected"],
   ["full", "Whole parts"],
 ];
+const k_note_ms = 6000; // for so long a note is shown in the glasses
+const k_notes = {
+  // by what hides parts
+  things: "",
+  hands: "Only hands hide parts, because this browser gives no depth of the room.",
+  nothing: "Parts are drawn over hands, because this browser gives neither depth of the room nor hands.",
+};
 const k_refusals = {
   NotAllowedError: "The glasses were refused. Allow this page to use them, then try again.",
   NotSupportedError: "This device cannot show parts over what you see. Use the window instead.",
@@ -34,6 +41,7 @@ class Glasses {
   #sent_at = 0;
   #is_tracking = true;
   #is_fetching = false;
+  #placed_at = null; // the first frame that parts were drawn in
   #place = null; // the newest message `glasses`
   #parts = null; // the newest message `glasses_parts`
   #problem = ""; // why Limn refused something
@@ -76,6 +84,11 @@ class Glasses {
     return this.#place.state === "registered" ? "" : this.#place.why;
   }
 
+  /** What the glasses cannot do, as a sentence; empty: nothing. */
+  get note() {
+    return this.#view ? k_notes[this.#view.hidden_by] : "";
+  }
+
   get state() {
     return this.is_on ? (this.#place?.state ?? "waiting") : "off";
   }
@@ -83,7 +96,7 @@ class Glasses {
   async put_on() {
     const xr = await navigator.xr.requestSession("immersive-ar", {
       optionalFeatures: ["local-floor", "depth-sensing", "hand-tracking"],
-      depthSensing: { usagePreference: ["cpu-optimized"], dataFormatPreference: ["luminance-alpha", "float32"] },
+      depthSensing: { usagePreference: ["cpu-optimized", "gpu-optimized"], dataFormatPreference: ["luminance-alpha", "float32"] },
     });
     xr.addEventListener("end", () => this.#ended());
     try {
@@ -144,6 +157,7 @@ class Glasses {
     this.#sent_at = 0;
     this.#is_tracking = true;
     this.#is_fetching = false;
+    this.#placed_at = null;
     this.#stage.rest(false);
     this.on_change();
   }
@@ -182,13 +196,15 @@ class Glasses {
       this.#send_pose(frame.predictedDisplayTime ?? time, pose.transform);
     }
     const place = is_tracking && this.#place?.state === "registered" ? this.#place : null;
+    if (place) this.#placed_at ??= time;
+    const is_note_due = place && time - this.#placed_at < k_note_ms;
     this.#view.draw(frame, pose, {
       space: this.#space,
       world_from_feed: place?.world_from_feed ?? null,
       parts: this.#parts,
       mode: this.parts,
       slots: this.#session.state?.slots ?? [],
-      words: this.words,
+      words: this.words || (is_note_due ? this.note : ""),
     });
     if (this.#view.is_fetching === this.#is_fetching) return;
     this.#is_fetching = this.#view.is_fetching;
@@ -231,8 +247,8 @@ function make_choice(owner, label, values, chosen, choose) {
 }
 
 function words_when_registered(owner) {
-  const known = "The glasses know where they are in the room.";
-  return owner.is_fetching ? `${known} The parts are being fetched …` : known;
+  const fetching = owner.is_fetching ? "The parts are being fetched …" : "";
+  return ["The glasses know where they are in the room.", owner.note, fetching].filter(Boolean).join(" ");
 }
 
 export function make_glasses(session, stage) {

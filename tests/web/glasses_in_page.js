@@ -15,6 +15,21 @@
   const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true, fovy: (55 * Math.PI) / 180, ipd: 0.063 });
   device.installRuntime({ forceInstall: true });
 
+  // The things that the device's depth sensor measures: a far wall, and a hand while it is held up.
+  class Things {
+    environmentCanvas = document.createElement("canvas");
+    hand = null;
+    render() {}
+    computeDepthBuffer(view, projection, width, height) {
+      const data = new Float32Array(width * height).fill(9);
+      for (let row = 0; row < height * (this.hand?.bottom ?? 0); ++row)
+        data.fill(0.25, row * width, row * width + Math.round(width * this.hand.right));
+      return { data: data.buffer, width, height, rawValueToMeters: 1 };
+    }
+  }
+  device.installSEM(Things);
+  const granted = { depth_usage: "cpu-optimized", features: ["local-floor", "hand-tracking"] };
+
   // Where the odometry believes the head to be at a moment of the walk.
   const move_to = (at_s) => {
     const at = Math.min(Math.max(at_s / path.step_s, 0), path.poses.length - 1.001),
@@ -51,8 +66,15 @@
     );
 
   const request = navigator.xr.requestSession.bind(navigator.xr);
-  navigator.xr.requestSession = async (...given) => {
-    xr = await request(...given);
+  navigator.xr.requestSession = async (mode, options) => {
+    const gives_depth = options.depthSensing.usagePreference.includes(granted.depth_usage);
+    const features = options.optionalFeatures.filter((name) => granted.features.includes(name));
+    xr = await request(mode, {
+      optionalFeatures: gives_depth ? [...features, "depth-sensing"] : features,
+      depthSensing: { ...options.depthSensing, usagePreference: [granted.depth_usage] },
+    });
+    places.length = 0;
+    device.sem.hand = null;
     return xr;
   };
   const Layer = window.XRWebGLLayer;
@@ -148,19 +170,37 @@
         w * cosine - x * sine,
       );
     },
-    // From now on the device measures a hand near the eye in the left half of each image, and nothing near in the right one.
-    hold_a_hand_up() {
-      const one = { configurable: true };
-      Object.defineProperty(xr, "depthUsage", { ...one, value: "cpu-optimized" });
-      Object.defineProperty(xr, "depthDataFormat", { ...one, value: "float32" });
-      const matrix = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
-      XRFrame.prototype.getDepthInformation = () => ({
-        width: 2,
-        height: 1,
-        data: new Float32Array([250, 9000]).buffer,
-        rawValueToMeters: 0.001,
-        normDepthBufferFromNormView: { matrix },
-      });
+    // What this browser grants: the usage of depth, or "none"; and other features.
+    grant(depth_usage, features) {
+      granted.depth_usage = depth_usage;
+      granted.features = features;
+    },
+    // From now on the device measures a hand near the eyes, from the upper left corner of each image to these shares of it.
+    hold_a_hand_up(right, bottom) {
+      device.sem.hand = { right, bottom };
+    },
+    // From now on depth comes as phones give it: a texture of two bytes a pixel, here mirrored.
+    give_depth_as_phones_do() {
+      Object.defineProperty(xr, "depthDataFormat", { configurable: true, value: "luminance-alpha" });
+      const mirrored = new Float32Array([-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1]);
+      const texture = gl.createTexture();
+      XRWebGLBinding.prototype.getDepthInformation = () => {
+        const { data, width, height } = device.sem.computeDepthBuffer(null, null, 320, 160);
+        const metres = new Float32Array(data),
+          bytes = new Uint8Array(2 * width * height);
+        metres.forEach((value, i) => {
+          const row = Math.floor(i / width),
+            column = width - 1 - (i % width),
+            raw = Math.round(1000 * value);
+          bytes.set([raw % 256, raw >> 8], 2 * (row * width + column));
+        });
+        gl.bindTexture(gl.TEXTURE_2D, texture);
+        gl.texImage2D(gl.TEXTURE_2D, 0, gl.LUMINANCE_ALPHA, width, height, 0, gl.LUMINANCE_ALPHA, gl.UNSIGNED_BYTE, bytes);
+        for (const name of ["TEXTURE_MIN_FILTER", "TEXTURE_MAG_FILTER"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.NEAREST);
+        for (const name of ["TEXTURE_WRAP_S", "TEXTURE_WRAP_T"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.CLAMP_TO_EDGE);
+        const normDepthBufferFromNormView = { matrix: mirrored };
+        return { texture, width, height, normDepthBufferFromNormView, rawValueToMeters: 0.001, textureType: "texture", imageIndex: null };
+      };
     },
     hide: (is_hidden) => device.updateVisibilityState(is_hidden ? "hidden" : "visible"),
   };

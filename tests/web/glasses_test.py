@@ -97,13 +97,33 @@ class Mask:
         return (self.bits >> by) if by >= 0 else (self.bits << -by) & ((1 << self.count) - 1)
 
     def area(self):
-        return bin(self.bits).count("1")
+        return count(self.bits)
+
+    def most(self, share):
+        """The column and the row that this share of the mask's pixels lies before."""
+        rows = [self.bits >> at & ((1 << self.width) - 1) for at in range(self.count - self.width, -1, -self.width)]
+        by_row = [count(row) for row in rows]
+        by_column = [sum(column) for column in zip(*([bit == "1" for bit in f"{row:0{self.width}b}"] for row in rows))]
+        place = lambda counts: next(at for at in range(len(counts)) if sum(counts[:at + 1]) >= share * self.area())
+        return place(by_column), place(by_row)
+
+
+def count(bits):
+    return bin(bits).count("1")
+
+
+def corner(right, bottom, width, height):
+    """The upper left corner of an image, as the bits of a mask."""
+    row, out = ((1 << right) - 1) << (width - right), 0
+    for _ in range(bottom):
+        out = out << width | row
+    return out << width * (height - bottom)
 
 
 def iou(one, two, dx=0, dy=0):
     moved = one.moved(dx, dy)
-    either = bin(moved | two.bits).count("1")
-    return bin(moved & two.bits).count("1") / either if either else 1.0
+    either = count(moved | two.bits)
+    return count(moved & two.bits) / either if either else 1.0
 
 
 def offset_px(drawn, true):
@@ -265,19 +285,47 @@ class Checks:
         browser.script("limn_glasses.device.primaryInputMode = 'controller'")
         self.step(browser, self.at_s)
 
-    def hands_hide_parts(self, browser):
+    def depth_hides_parts(self, browser, name="depth"):
+        """A hand that the depth sensor sees covers the upper left corner of each image, and there a share of the parts."""
         self.draw_parts(browser, "full")
-        browser.script("limn_glasses.hold_a_hand_up()")
-        for eye in self.capture(browser):
-            true = self.true_masks(eye, pose_product(eye["world_from_feed"], eye["feed_from_view"]))["full"]
-            row, half = eye["width"] // 4, eye["width"] // 8
-            rows = lambda bits: [bits[at:at + row] for at in range(0, len(bits), row)]
-            behind = sum(bin(int(one[:half], 16)).count("1") for one in rows(eye["bits"]))
-            beside = [Mask("".join(one[half:] for one in rows(bits)), eye["width"] // 2) for bits in (eye["bits"], true)]
-            expect(behind == 0, "nothing drawn over the hand", behind)
-            if beside[1].area() > 200:
-                expect(iou(*beside) > 0.9, "the parts beside the hand", iou(*beside))
-        browser.screenshot(os.path.join(self.out, "hand.png"))
+        for at in (0, 1):
+            eye = self.capture(browser)[at]
+            width, height = eye["width"], eye["height"]
+            true = Mask(self.true_masks(eye, pose_product(eye["world_from_feed"], eye["feed_from_view"]))["full"], width)
+            right, bottom = (4 * round(place / 4) for place in true.most(0.7))
+            browser.script("limn_glasses.hold_a_hand_up(...arguments)", right / width, bottom / height)
+            drawn = Mask(self.capture(browser)[at]["bits"], width)
+            hand, middle = corner(right, bottom, width, height), corner(right - 8, bottom - 8, width, height)
+            hidden, beside = count(true.bits & hand), true.bits & ~hand
+            expect(hidden > 200 and count(beside) > 200, "parts behind the hand and beside it", (hidden, count(beside)))
+            expect(not drawn.bits & middle, "nothing drawn over the hand", count(drawn.bits & middle))
+            overlap = count(drawn.bits & beside) / count(drawn.bits | beside)
+            expect(overlap > 0.9, "the parts beside the hand", overlap)
+        browser.screenshot(os.path.join(self.out, f"{name}.png"))
+
+    def put_on_again(self, browser, depth_usage, *features):
+        """Other glasses, whose browser grants this."""
+        browser.script("document.querySelector('#glasses').click()")
+        wait_for("the button again", lambda: "Put the glasses on" in browser.text("#glasses"))
+        browser.script("limn_glasses.grant(...arguments)", depth_usage, ["local-floor", *features])
+        browser.click("#glasses")
+        self.stand(browser, "words on what to do", lambda: browser.text("#glasses-why"))
+        self.look_round(browser)
+        self.stand(browser, "all parts on the page",
+                   lambda: browser.text("#glasses-why").startswith(READY) and "fetched" not in browser.text("#glasses-why"))
+
+    def depth_by_texture_hides_parts(self, browser):
+        self.put_on_again(browser, "gpu-optimized")
+        self.depth_hides_parts(browser, "depth-buffer")
+        browser.script("limn_glasses.give_depth_as_phones_do()")
+        self.depth_hides_parts(browser, "depth-of-a-phone")
+
+    def what_hides_no_parts_is_said(self, browser):
+        self.put_on_again(browser, "none", "hand-tracking")
+        expect("Only hands hide parts" in browser.text("#glasses-why"), "words about hands", browser.text("#glasses-why"))
+        self.put_on_again(browser, "none")
+        expect("Parts are drawn over hands" in browser.text("#glasses-why"), "words about hands", browser.text("#glasses-why"))
+        browser.screenshot(os.path.join(self.out, "no-depth.png"))
 
     def save(self, name, eye, there):
         """Both masks as one image: red drawn, green true, so that yellow is right."""
@@ -332,7 +380,9 @@ class Checks:
             driver = file.read()
         with self.page(self.iwer, driver) as browser:
             for check in (self.the_glasses_find_the_room, self.parts_are_drawn_where_they_are, self.tracked_hands_hide_parts,
-                          self.hands_hide_parts, self.traffic_is_small, self.sleep_is_seen_by_all, self.taking_them_off_changes_no_projector):
+                          self.depth_hides_parts, self.traffic_is_small, self.sleep_is_seen_by_all,
+                          self.depth_by_texture_hides_parts, self.what_hides_no_parts_is_said,
+                          self.taking_them_off_changes_no_projector):
                 try:
                     self._run(check, browser)
                 except Failed:
