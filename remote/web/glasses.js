@@ -7,6 +7,13 @@ const k_parts = [
   ["rest", "Not projected"],
   ["full", "Whole parts"],
 ];
+const k_note_ms = 6000; // for so long a note is shown in the glasses
+const k_notes = {
+  // by what hides parts
+  things: "",
+  hands: "Only hands hide parts, because this browser gives no depth of the room.",
+  nothing: "Parts are drawn over hands, because this browser gives neither depth of the room nor hands.",
+};
 const k_refusals = {
   NotAllowedError: "The glasses were refused. Allow this page to use them, then try again.",
   NotSupportedError: "This device cannot show parts over what you see. Use the window instead.",
@@ -33,6 +40,8 @@ class Glasses {
   #view = null;
   #sent_at = 0;
   #is_tracking = true;
+  #is_fetching = false;
+  #placed_at = null; // the first frame that parts were drawn in
   #place = null; // the newest message `glasses`
   #parts = null; // the newest message `glasses_parts`
   #problem = ""; // why Limn refused something
@@ -59,14 +68,25 @@ class Glasses {
     return this.#place?.markers ?? [];
   }
 
+  /** Whether parts are known that the page does not have yet. */
+  get is_fetching() {
+    return this.#is_fetching;
+  }
+
   /** What is wrong, or what to do, as a sentence; empty: all is well. */
   get words() {
     if (!this.is_on) return "";
     if (this.#link.status !== "connected") return "No connection to Limn. Trying again …";
     if (this.#problem) return this.#problem;
+    if (this.#place?.state === "asleep") return this.#place.why;
     if (!this.#is_tracking) return "The glasses have lost their tracking. Look round slowly, in good light.";
     if (!this.#place) return "Waiting for Limn …";
     return this.#place.state === "registered" ? "" : this.#place.why;
+  }
+
+  /** What the glasses cannot do, as a sentence; empty: nothing. */
+  get note() {
+    return this.#view ? k_notes[this.#view.hidden_by] : "";
   }
 
   get state() {
@@ -76,7 +96,7 @@ class Glasses {
   async put_on() {
     const xr = await navigator.xr.requestSession("immersive-ar", {
       optionalFeatures: ["local-floor", "depth-sensing", "hand-tracking"],
-      depthSensing: { usagePreference: ["cpu-optimized"], dataFormatPreference: ["luminance-alpha", "float32"] },
+      depthSensing: { usagePreference: ["cpu-optimized", "gpu-optimized"], dataFormatPreference: ["luminance-alpha", "float32"] },
     });
     xr.addEventListener("end", () => this.#ended());
     try {
@@ -134,6 +154,10 @@ class Glasses {
     this.#view?.close();
     this.#view = null;
     this.#problem = "";
+    this.#sent_at = 0;
+    this.#is_tracking = true;
+    this.#is_fetching = false;
+    this.#placed_at = null;
     this.#stage.rest(false);
     this.on_change();
   }
@@ -172,14 +196,19 @@ class Glasses {
       this.#send_pose(frame.predictedDisplayTime ?? time, pose.transform);
     }
     const place = is_tracking && this.#place?.state === "registered" ? this.#place : null;
+    if (place) this.#placed_at ??= time;
+    const is_note_due = place && time - this.#placed_at < k_note_ms;
     this.#view.draw(frame, pose, {
       space: this.#space,
       world_from_feed: place?.world_from_feed ?? null,
       parts: this.#parts,
       mode: this.parts,
       slots: this.#session.state?.slots ?? [],
-      words: this.words,
+      words: this.words || (is_note_due ? this.note : ""),
     });
+    if (this.#view.is_fetching === this.#is_fetching) return;
+    this.#is_fetching = this.#view.is_fetching;
+    this.on_change();
   }
 
   #send_pose(time, { orientation: q, position: p }) {
@@ -217,6 +246,11 @@ function make_choice(owner, label, values, chosen, choose) {
   return h("div", { class: "choices", role: "group", "aria-label": label }, ...buttons);
 }
 
+function words_when_registered(owner) {
+  const fetching = owner.is_fetching ? "The parts are being fetched …" : "";
+  return ["The glasses know where they are in the room.", owner.note, fetching].filter(Boolean).join(" ");
+}
+
 export function make_glasses(session, stage) {
   const owner = new Glasses(session, stage);
   const why = h("p", { role: "status", class: "soft", id: "glasses-why" });
@@ -235,7 +269,7 @@ export function make_glasses(session, stage) {
   by_id("window").append(h("div", { class: "stack" }, h("h3", {}, "Glasses"), why, choice, marker, button));
   owner.on_change = () => {
     set_text(words, owner.is_on ? "Take the glasses off" : "Put the glasses on");
-    set_text(why, owner.is_on ? owner.words || "The glasses know where they are in the room." : "");
+    set_text(why, owner.is_on ? owner.words || words_when_registered(owner) : "");
     why.dataset.state = owner.state;
     marker.hidden = owner.markers.length < 2;
     if (marker.options.length !== owner.markers.length)
@@ -243,9 +277,11 @@ export function make_glasses(session, stage) {
   };
   button.addEventListener("click", () => {
     if (owner.is_on) return owner.take_off();
+    button.disabled = true; // until the glasses have started
     owner
       .put_on()
-      .catch((refusal) => set_text(why, k_refusals[refusal.name] ?? `The glasses did not start: ${refusal.message}`));
+      .catch((refusal) => set_text(why, k_refusals[refusal.name] ?? `The glasses did not start: ${refusal.message}`))
+      .finally(() => (button.disabled = false));
   });
   const check = async () => {
     const reason = await why_no_glasses();

@@ -5,10 +5,12 @@ import { product, read_glb } from "/glb.js";
 import { delete_mesh, k_shading, make_program, upload_mesh } from "/mesh_gl.js";
 
 const k_near = 0.05,
-  k_far = 20; // m
+  k_far = 20, // m
+  k_endless = 1e6; // m
 const k_shadow_px = 2048,
   k_outline_px = 1024,
   k_most_projectors = 8;
+const k_depth_kinds = ["none", "raw", "bytes", "buffer"]; // how a texture states depth: u_depth_kind is the index
 const k_moved = 2e-4; // shadows are drawn again when the prototype has moved by more, in m and of a quaternion
 
 const k_vertex = `#version 300 es
@@ -65,11 +67,16 @@ void main() {
 
 const k_part_fragment = `#version 300 es
 precision highp float;
+precision highp sampler2DArray;
 uniform vec4 u_base;
 uniform sampler2D u_texture;
 uniform float u_unlit, u_cut_below;
-uniform bool u_rest, u_on_surface, u_has_prototype, u_has_depth;
+uniform bool u_rest, u_on_surface, u_has_prototype;
 uniform sampler2D s_place, s_prototype, s_depth;
+uniform sampler2DArray s_depths;
+uniform int u_depth_kind; // of k_depth_kinds
+uniform float u_depth_layer, u_depth_scale; // layer of s_depths, or below 0 for s_depth; metres of a raw value of 1
+uniform vec2 u_depth_range; // near and far plane of a depth buffer, m
 uniform mat4 u_clip_from_view, u_depth_from_view;
 uniform ivec2 u_corner;
 uniform vec2 u_size;
@@ -79,6 +86,15 @@ out vec4 o_colour;
 ${k_shading}
 const float k_on_surface = 0.002, k_same_place = 1e-4; // m, as in Limn's shaders
 const float k_nearer = 0.03; // m; a hand is nearer than what it hides by more than the depth sensor's noise
+// Distance of real things from the eye's plane, m; 0: not measured there.
+float real_depth(vec2 px) {
+  vec4 place = u_depth_from_view * vec4(px.x, u_depth_kind == 3 ? px.y : 1.0 - px.y, 0, 1);
+  vec2 at = place.xy / place.w;
+  vec4 raw = u_depth_layer < 0.0 ? texture(s_depth, at) : texture(s_depths, vec3(at, u_depth_layer));
+  if (u_depth_kind == 1) return raw.r * u_depth_scale;
+  if (u_depth_kind == 2) return dot(raw.ra, vec2(255, 255 * 256)) * u_depth_scale;
+  return raw.r > 0.0 ? u_depth_range.x / max(1.0 - raw.r * (1.0 - u_depth_range.x / u_depth_range.y), 1e-6) : 0.0;
+}
 void main() {
   vec4 texel = texture(u_texture, v_uv);
   if (texel.a < u_cut_below) discard;
@@ -92,9 +108,8 @@ void main() {
     if (height < (u_on_surface ? -k_on_surface : -k_same_place)) discard;
     by_light = place.r > 0.5 && (!u_on_surface || height <= k_on_surface);
   }
-  if (u_has_depth) {
-    vec2 at = (u_depth_from_view * vec4((gl_FragCoord.xy - vec2(u_corner)) / u_size * vec2(1, -1) + vec2(0, 1), 0, 1)).xy;
-    float real = texture(s_depth, at).r;
+  if (u_depth_kind > 0) {
+    float real = real_depth((gl_FragCoord.xy - vec2(u_corner)) / u_size);
     if (real > 0.0 && real < min(-v_position.z, z_behind) - k_nearer) discard;
   }
   if (u_rest && by_light) {
@@ -184,28 +199,35 @@ async function fetched(path) {
 class MeshStore {
   #gl;
   #all = new Map();
+  #fetching = new Set(); // entries on their way
   problem = ""; // why one could not be fetched
   constructor(gl) {
     this.#gl = gl;
+  }
+  get is_fetching() {
+    return this.#fetching.size > 0;
   }
   /** The meshes on the GPU; an empty list while they are on their way. */
   of(path) {
     if (!this.#all.has(path)) {
       const entry = { meshes: [] };
       this.#all.set(path, entry);
+      this.#fetching.add(entry);
       fetched(path)
         .then((answer) => answer.arrayBuffer())
         .then(read_glb)
         .then((meshes) => {
           if (this.#all.get(path) === entry) entry.meshes = meshes.map((mesh) => upload_mesh(this.#gl, mesh));
         })
-        .catch((problem) => (this.problem = `A part could not be fetched: ${problem.message}`));
+        .catch((problem) => (this.problem = `A part could not be fetched: ${problem.message}`))
+        .finally(() => this.#fetching.delete(entry));
     }
     return this.#all.get(path).meshes;
   }
   clear() {
     for (const { meshes } of this.#all.values()) for (const mesh of meshes) delete_mesh(this.#gl, mesh);
     this.#all.clear();
+    this.#fetching.clear();
     this.problem = "";
   }
 }
@@ -398,11 +420,85 @@ class ProjectorLight {
   }
 }
 
+// How the browser gives the depth of real things: "cpu-optimized", "gpu-optimized", or "none".
+function depth_usage_of(xr) {
+  try {
+    const is_granted = xr.enabledFeatures?.includes("depth-sensing") ?? true;
+    return (is_granted && xr.depthUsage) || "none";
+  } catch {
+    return "none"; // browsers refuse to say when it was not granted
+  }
+}
+
+/** The depth of real things in each eye's image. */
+class RealDepth {
+  #xr;
+  #gl;
+  #usage;
+  #texture;
+  #binding = null;
+  constructor(xr, gl) {
+    this.#xr = xr;
+    this.#gl = gl;
+    this.#usage = depth_usage_of(xr);
+    this.#texture = gl.createTexture();
+    if (this.#usage === "gpu-optimized" && window.XRWebGLBinding?.prototype.getDepthInformation)
+      this.#binding = new XRWebGLBinding(xr, gl);
+  }
+  /** Whether the browser gives it. */
+  get is_known() {
+    return this.#usage === "cpu-optimized" || this.#binding !== null;
+  }
+  /** {kind, texture, layer, scale, near, far, matrix} as in the shader; null: not known in this frame. */
+  of(frame, view) {
+    try {
+      if (this.#binding) return this.#by_texture(this.#binding.getDepthInformation(view));
+      if (this.#usage === "cpu-optimized") return this.#by_data(frame.getDepthInformation?.(view));
+    } catch {
+      // it was not granted, or has been withdrawn
+    }
+    return null;
+  }
+  #by_data(depth) {
+    if (!depth?.width) return null;
+    const raw = this.#xr.depthDataFormat === "float32" ? new Float32Array(depth.data) : new Uint16Array(depth.data);
+    const gl = this.#gl;
+    gl.activeTexture(gl.TEXTURE5);
+    gl.bindTexture(gl.TEXTURE_2D, this.#texture);
+    gl.pixelStorei(gl.UNPACK_FLIP_Y_WEBGL, false);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, depth.width, depth.height, 0, gl.RED, gl.FLOAT, Float32Array.from(raw));
+    for (const name of ["TEXTURE_MIN_FILTER", "TEXTURE_MAG_FILTER"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.NEAREST);
+    gl.activeTexture(gl.TEXTURE0);
+    return this.#with(depth, "raw", this.#texture, -1);
+  }
+  // Headsets give a depth buffer with its near plane, rows from below, whatever format they say; phones a texture of the format that
+  // they say, rows from above. A texture of integers cannot be read by these shaders.
+  #by_texture(depth) {
+    if (!depth?.texture) return null;
+    const layer = depth.textureType === "texture-array" ? (depth.imageIndex ?? 0) : -1;
+    if (layer >= 0 && depth.depthNear > 0) return this.#with(depth, "buffer", depth.texture, layer);
+    const kind = { "luminance-alpha": "bytes", float32: "raw" }[this.#xr.depthDataFormat];
+    return kind ? this.#with(depth, kind, depth.texture, layer) : null;
+  }
+  #with(depth, kind, texture, layer) {
+    return {
+      kind: k_depth_kinds.indexOf(kind),
+      texture,
+      layer,
+      scale: depth.rawValueToMeters,
+      near: depth.depthNear ?? 0,
+      far: Math.min(depth.depthFar ?? k_endless, k_endless),
+      matrix: depth.normDepthBufferFromNormView.matrix,
+    };
+  }
+}
+
 /** Draws for one WebXR session. */
 export class GlassesView {
   #xr;
   #gl;
   #layer;
+  #real_depth;
   #light;
   #hands;
   #meshes;
@@ -411,11 +507,11 @@ export class GlassesView {
   #words_pass;
   #place_frame;
   #place = { texture: null, depth: null, width: 0, height: 0 };
-  #depth_texture;
   #words_texture;
   #words_quad;
   #words = "";
   #scene = -1;
+  #lit_scene = -1; // the scene whose projectors have been fetched
 
   /** Makes a session's layer. Throws an Error whose message can be shown. */
   static async open(xr) {
@@ -438,7 +534,7 @@ export class GlassesView {
     this.#part_pass = make_pass(gl, k_vertex, k_part_fragment);
     this.#words_pass = make_pass(gl, k_words_vertex, k_words_fragment);
     this.#place_frame = gl.createFramebuffer();
-    this.#depth_texture = gl.createTexture();
+    this.#real_depth = new RealDepth(xr, gl);
     this.#words_texture = gl.createTexture();
     this.#words_quad = gl.createVertexArray();
     gl.bindVertexArray(this.#words_quad);
@@ -452,6 +548,17 @@ export class GlassesView {
   close() {
     this.#meshes.clear();
     this.#gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  /** What hides parts: "things" all of them, tracked "hands" alone, or "nothing" but the prototype. */
+  get hidden_by() {
+    if (this.#real_depth.is_known) return "things";
+    return this.#xr.enabledFeatures?.includes("hand-tracking") ? "hands" : "nothing";
+  }
+
+  /** Whether something that belongs to the picture is still on its way. */
+  get is_fetching() {
+    return this.#meshes.is_fetching || this.#lit_scene !== this.#scene;
   }
 
   /**
@@ -477,7 +584,7 @@ export class GlassesView {
       const eye = {
         viewport: corner,
         clip_from_view: view.projectionMatrix,
-        depth: this.#depth_of(frame, view),
+        depth: this.#real_depth.of(frame, view),
         view_from_world: feed_from_world && product(view.transform.inverse.matrix, feed_from_world),
       };
       if (feed_from_world && parts) {
@@ -499,28 +606,8 @@ export class GlassesView {
     fetched("/glasses/light.json")
       .then((answer) => answer.json())
       .then((light) => this.#scene === scene && this.#light.set(light))
-      .catch((problem) => (this.#meshes.problem = `The projectors could not be fetched: ${problem.message}`));
-  }
-
-  // The depth of real things, where the device measures it; null: it does not.
-  #depth_of(frame, view) {
-    let depth = null;
-    try {
-      depth = this.#xr.depthUsage === "cpu-optimized" ? frame.getDepthInformation?.(view) : null;
-    } catch {
-      return null; // the feature was not granted
-    }
-    if (!depth?.width) return null;
-    const raw =
-      this.#xr.depthDataFormat === "float32" ? new Float32Array(depth.data) : new Uint16Array(depth.data);
-    const gl = this.#gl,
-      metres = Float32Array.from(raw, (value) => value * depth.rawValueToMeters);
-    gl.activeTexture(gl.TEXTURE5);
-    gl.bindTexture(gl.TEXTURE_2D, this.#depth_texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, depth.width, depth.height, 0, gl.RED, gl.FLOAT, metres);
-    for (const name of ["TEXTURE_MIN_FILTER", "TEXTURE_MAG_FILTER"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.NEAREST);
-    gl.activeTexture(gl.TEXTURE0);
-    return depth.normDepthBufferFromNormView.matrix;
+      .catch((problem) => (this.#meshes.problem = `The projectors could not be fetched: ${problem.message}`))
+      .finally(() => this.#scene === scene && (this.#lit_scene = scene));
   }
 
   #size_place(width, height) {
@@ -576,17 +663,31 @@ export class GlassesView {
     }
   }
 
+  #bind_depth(at, depth) {
+    const gl = this.#gl;
+    gl.uniform1i(at("u_depth_kind"), depth?.kind ?? 0);
+    gl.uniform1i(at("s_depth"), 5);
+    gl.uniform1i(at("s_depths"), 6);
+    if (!depth) return;
+    const is_array = depth.layer >= 0;
+    gl.activeTexture(is_array ? gl.TEXTURE6 : gl.TEXTURE5);
+    gl.bindTexture(is_array ? gl.TEXTURE_2D_ARRAY : gl.TEXTURE_2D, depth.texture);
+    gl.uniform1f(at("u_depth_layer"), depth.layer);
+    gl.uniform1f(at("u_depth_scale"), depth.scale);
+    gl.uniform2f(at("u_depth_range"), depth.near, depth.far);
+    gl.uniformMatrix4fv(at("u_depth_from_view"), false, depth.matrix);
+  }
+
   #draw_parts(eye, parts, mode, slots, has_prototype) {
     const gl = this.#gl,
       { x, y, width, height } = eye.viewport,
       at = this.#use(this.#part_pass, eye);
     gl.uniform1i(at("u_rest"), mode === "rest");
     gl.uniform1i(at("u_has_prototype"), has_prototype);
-    gl.uniform1i(at("u_has_depth"), eye.depth !== null);
-    if (eye.depth) gl.uniformMatrix4fv(at("u_depth_from_view"), false, eye.depth);
+    this.#bind_depth(at, eye.depth);
     gl.uniform2i(at("u_corner"), x, y);
     gl.uniform2f(at("u_size"), width, height);
-    const bound = { s_place: [3, this.#place.texture], s_prototype: [4, this.#place.depth], s_depth: [5, this.#depth_texture] };
+    const bound = { s_place: [3, this.#place.texture], s_prototype: [4, this.#place.depth] };
     for (const [name, [unit, texture]] of Object.entries(bound)) {
       gl.activeTexture(gl.TEXTURE0 + unit);
       gl.bindTexture(gl.TEXTURE_2D, texture);

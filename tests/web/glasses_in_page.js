@@ -1,22 +1,38 @@
-// Runs before the page, after iwer: emulated glasses that follow a path in time, and what the tests ask of them.
+// Runs before the page, after iwer: emulated glasses, and what the tests ask of them. Time stands still for them between two
+// calls of step(): a frame is drawn when one is asked for, so that a slow machine measures the same as a fast one.
 (() => {
   const native_frame = window.requestAnimationFrame.bind(window);
+  const k_clock_offset_s = 1234.5; // of the page's clock against the session's
   let path = null, // of web_glasses_room
-    walk = { at_unix_s: Infinity, from_s: 0, until_s: 0 },
+    clock_s = k_clock_offset_s,
+    device_frame = null, // iwer's next frame
     xr = null,
     layer = null,
     gl = null;
-  const traffic = { frames: 0, sent: 0, received: 0, largest: 0 },
+  const traffic = { frames: 0, sent: 0, others: 0, largest: { glasses: 0, glasses_parts: 0 } }, // bytes
     places = [];
 
   const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true, fovy: (55 * Math.PI) / 180, ipd: 0.063 });
   device.installRuntime({ forceInstall: true });
 
-  // Where the odometry believes the head to be.
-  const move_to = (unix_s) => {
-    if (!path) return;
-    const at_s = Math.min(Math.max(unix_s - walk.at_unix_s + walk.from_s, walk.from_s), walk.until_s);
-    const at = Math.min(at_s / path.step_s, path.poses.length - 1.001),
+  // The things that the device's depth sensor measures: a far wall, and a hand while it is held up.
+  class Things {
+    environmentCanvas = document.createElement("canvas");
+    hand = null;
+    render() {}
+    computeDepthBuffer(view, projection, width, height) {
+      const data = new Float32Array(width * height).fill(9);
+      for (let row = 0; row < height * (this.hand?.bottom ?? 0); ++row)
+        data.fill(0.25, row * width, row * width + Math.round(width * this.hand.right));
+      return { data: data.buffer, width, height, rawValueToMeters: 1 };
+    }
+  }
+  device.installSEM(Things);
+  const granted = { depth_usage: "cpu-optimized", features: ["local-floor", "hand-tracking"] };
+
+  // Where the odometry believes the head to be at a moment of the walk.
+  const move_to = (at_s) => {
+    const at = Math.min(Math.max(at_s / path.step_s, 0), path.poses.length - 1.001),
       i = Math.floor(at),
       share = at - i;
     const [a, b] = [path.poses[i], path.poses[i + 1]],
@@ -25,27 +41,40 @@
     device.quaternion.set(...[1, 2, 3, 0].map((k) => mixed[k] / length));
     device.position.set(...mixed.slice(4));
   };
-  // The head stands where it is at the frame's own time, which iwer gets from performance.now().
-  window.requestAnimationFrame = (callback) =>
-    native_frame((time) => {
-      const now = performance.now();
-      move_to((performance.timeOrigin + now) / 1000);
-      performance.now = () => now;
-      try {
-        callback(time);
-      } finally {
-        delete performance.now;
-      }
-    });
+  // iwer's frames wait for draw_frame(); others, of the page itself, are drawn as always.
+  window.requestAnimationFrame = (callback) => {
+    if (callback.name !== "onDeviceFrame") return native_frame(callback);
+    device_frame = callback;
+    return -1;
+  };
+  // Draws a frame, whose time iwer gets from performance.now().
+  const draw_frame = () =>
+    new Promise((done) =>
+      native_frame(() => {
+        const draw = device_frame,
+          time = 1000 * clock_s;
+        device_frame = null;
+        performance.now = () => time;
+        try {
+          draw?.(time);
+        } finally {
+          delete performance.now;
+        }
+        ++traffic.frames;
+        done();
+      }),
+    );
 
   const request = navigator.xr.requestSession.bind(navigator.xr);
-  navigator.xr.requestSession = async (...given) => {
-    xr = await request(...given);
-    const count = () => {
-      ++traffic.frames;
-      xr.requestAnimationFrame(count);
-    };
-    xr.requestAnimationFrame(count);
+  navigator.xr.requestSession = async (mode, options) => {
+    const gives_depth = options.depthSensing.usagePreference.includes(granted.depth_usage);
+    const features = options.optionalFeatures.filter((name) => granted.features.includes(name));
+    xr = await request(mode, {
+      optionalFeatures: gives_depth ? [...features, "depth-sensing"] : features,
+      depthSensing: { ...options.depthSensing, usagePreference: [granted.depth_usage] },
+    });
+    places.length = 0;
+    device.sem.hand = null;
     return xr;
   };
   const Layer = window.XRWebGLLayer;
@@ -60,12 +89,11 @@
     constructor(...given) {
       super(...given);
       this.addEventListener("message", ({ data }) => {
+        const message = typeof data === "string" ? JSON.parse(data) : { type: "image" };
         const bytes = data.length ?? data.byteLength;
-        traffic.received += bytes;
-        traffic.largest = Math.max(traffic.largest, bytes);
-        if (typeof data !== "string") return;
-        const message = JSON.parse(data);
-        if (message.type === "glasses") places.push({ unix_s: Date.now() / 1000, ...message });
+        if (message.type in traffic.largest) traffic.largest[message.type] = Math.max(traffic.largest[message.type], bytes);
+        else traffic.others += bytes;
+        if (message.type === "glasses") places.push(message);
       });
     }
     send(data) {
@@ -78,15 +106,21 @@
   window.limn_glasses = {
     device,
     places,
-    walk_on(given, at_unix_s, from_s, until_s) {
+    set_path: (given) => {
       path = given;
-      walk = { at_unix_s, from_s, until_s };
     },
-    traffic: () => ({ ...traffic }),
+    // The session's clock is now_s, and the person is at at_s of the walk. Returns the newest state that the page was told.
+    async step(now_s, at_s) {
+      clock_s = now_s + k_clock_offset_s;
+      move_to(at_s);
+      await draw_frame();
+      return places.at(-1)?.state ?? "none";
+    },
+    traffic: () => structuredClone(traffic),
 
-    // The pixels of each eye that the page has drawn in its next frame, as web_glasses_room's masks, first row first.
+    // The pixels of each eye that the page draws in a frame, as web_glasses_room's masks, first row first.
     capture: () =>
-      new Promise((done) =>
+      new Promise((done) => {
         xr.requestAnimationFrame((time, frame) => {
           const eyes = [];
           for (const view of layer_views(frame)) {
@@ -108,8 +142,9 @@
             eyes.push({ width, height, bits, eye: view.eye, projection: [...view.projectionMatrix], feed_from_view, world_from_feed });
           }
           done(eyes);
-        }),
-      ),
+        });
+        draw_frame();
+      }),
     // The left hand stands before the face.
     raise_a_hand() {
       device.primaryInputMode = "hand";
@@ -135,19 +170,37 @@
         w * cosine - x * sine,
       );
     },
-    // From now on the device measures a hand near the eye in the left half of each image, and nothing near in the right one.
-    hold_a_hand_up() {
-      const one = { configurable: true };
-      Object.defineProperty(xr, "depthUsage", { ...one, value: "cpu-optimized" });
-      Object.defineProperty(xr, "depthDataFormat", { ...one, value: "float32" });
-      const matrix = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
-      XRFrame.prototype.getDepthInformation = () => ({
-        width: 2,
-        height: 1,
-        data: new Float32Array([250, 9000]).buffer,
-        rawValueToMeters: 0.001,
-        normDepthBufferFromNormView: { matrix },
-      });
+    // What this browser grants: the usage of depth, or "none"; and other features.
+    grant(depth_usage, features) {
+      granted.depth_usage = depth_usage;
+      granted.features = features;
+    },
+    // From now on the device measures a hand near the eyes, from the upper left corner of each image to these shares of it.
+    hold_a_hand_up(right, bottom) {
+      device.sem.hand = { right, bottom };
+    },
+    // From now on depth comes as phones give it: a texture of two bytes a pixel, here mirrored.
+    give_depth_as_phones_do() {
+      Object.defineProperty(xr, "depthDataFormat", { configurable: true, value: "luminance-alpha" });
+      const mirrored = new Float32Array([-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0, 0, 1]);
+      const texture = gl.createTexture();
+      XRWebGLBinding.prototype.getDepthInformation = () => {
+        const { data, width, height } = device.sem.computeDepthBuffer(null, null, 320, 160);
+        const metres = new Float32Array(data),
+          bytes = new Uint8Array(2 * width * height);
+        metres.forEach((value, i) => {
+          const row = Math.floor(i / width),
+            column = width - 1 - (i % width),
+            raw = Math.round(1000 * value);
+          bytes.set([raw % 256, raw >> 8], 2 * (row * width + column));
+        });
+        gl.bindTexture(gl.TEXTURE_2D, texture);
+        gl.texImage2D(gl.TEXTURE_2D, 0, gl.LUMINANCE_ALPHA, width, height, 0, gl.LUMINANCE_ALPHA, gl.UNSIGNED_BYTE, bytes);
+        for (const name of ["TEXTURE_MIN_FILTER", "TEXTURE_MAG_FILTER"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.NEAREST);
+        for (const name of ["TEXTURE_WRAP_S", "TEXTURE_WRAP_T"]) gl.texParameteri(gl.TEXTURE_2D, gl[name], gl.CLAMP_TO_EDGE);
+        const normDepthBufferFromNormView = { matrix: mirrored };
+        return { texture, width, height, normDepthBufferFromNormView, rawValueToMeters: 0.001, textureType: "texture", imageIndex: null };
+      };
     },
     hide: (is_hidden) => device.updateVisibilityState(is_hidden ? "hidden" : "visible"),
   };

@@ -1,11 +1,11 @@
 // web_glasses_room FOLDER: a session of the studio, served to a page with emulated glasses (glasses_test.py).
 // A person wears them; the room's cameras measure their marker, and FOLDER/path.json says where their
-// drifting odometry believes them to be. Commands come by the standard input, a line each:
-//   walk UNIX_S FROM UNTIL    the walk is at FROM (s) at that time, goes on to UNTIL, and stays there
-//   station INDEX X           the pose of an eye at a station
+// drifting odometry believes them to be. The session's clock moves only when it is told to, so that results
+// do not depend on how busy the machine is. Commands come by the standard input, a line each:
+//   step NOW AT               the session's clock is NOW (s), and the person is at AT (s) of the walk
+//   eye AT X                  the true pose of an eye at AT of the walk, X (m) beside the middle of both eyes
 //   mask SIZE… EYE… POSE…     which pixels of an eye parts and light cover (see mask_of)
 //   projected                 a number that changes with the projectors' images
-//   marker on|off             whether the cameras see the marker
 // Answers are lines of JSON on the standard output.
 #include <fmt/format.h>
 
@@ -18,6 +18,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <numeric>
 #include <random>
 #include <sstream>
 #include <thread>
@@ -47,10 +48,6 @@ constexpr int k_stations = 3;
 constexpr double k_marker_rad = 2e-3, k_marker_m = 0.5e-3;
 constexpr double k_drift_rad = 0.02 * k_degree, k_drift_m = 0.3e-3;  // in a second
 
-double unix_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
-
 // The eye looks along -z with y up, as in WebXR.
 Pose eye_at(const Vector3d& p_eye, const Vector3d& p_target) {
   const Pose turned(Eigen::Quaterniond(0, 1, 0, 0), Vector3d::Zero());
@@ -68,10 +65,10 @@ Vector6d noise(std::mt19937_64& rng, double rotation, double translation) {
 struct Walk {
   std::vector<Pose> world_from_eye, feed_from_eye;
 
-  const Pose& eye(double at_s) const { return world_from_eye[index(at_s)]; }
-  std::size_t index(double at_s) const {
-    const double step = std::round(std::max(0.0, at_s) / k_step_s);
-    return std::min(static_cast<std::size_t>(step), world_from_eye.size() - 1);
+  Pose eye(double at_s) const {
+    const double step = std::clamp(at_s / k_step_s, 0.0, static_cast<double>(world_from_eye.size()) - 1.001);
+    const auto i = static_cast<std::size_t>(step);
+    return interpolated(world_from_eye[i], world_from_eye[i + 1], step - static_cast<double>(i));
   }
 };
 
@@ -136,12 +133,6 @@ json path_of(const Walk& walk) {
   return out;
 }
 
-// Which part of the walk is walked.
-struct Walking {
-  double begun_unix_s = 0, from_s = 0, until_s = 0;
-  double at_s() const { return std::clamp(unix_s() - begun_unix_s, from_s, until_s); }
-};
-
 class Room {
  public:
   explicit Room(const fs::path& folder) : context_(device::GlContext::create().value()) {
@@ -166,7 +157,8 @@ class Room {
     for (int i = 0; i < 8; ++i) percepts_ = perception.watch(rig.expose(std::span(&camera, 1)));
     const Stamp seen_at = percepts_.captured_at;
     session_->update_percepts(percepts_, ++moments_);
-    session_->compose_and_record(seen_at, seen_at);
+    // From its second frame on a scene that stands still is drawn more smoothly.
+    for (int i = 0; i < 2; ++i) session_->compose_and_record(seen_at, seen_at);
     renderer_.emplace(projector::Renderer::create(setup_.scene, setup_.rig).value());
     walk_ = walk_through(p_middle_, rng_);
     LIMN_CHECK(write_file(folder / "path.json", path_of(walk_).dump()).ok());
@@ -181,38 +173,42 @@ class Room {
     return {{"url", invited.url}, {"pins", invited.pins}, {"projected", projected()}};
   }
 
-  void walk_on(double at_unix_s, double from_s, double until_s) {
-    walking_ = {at_unix_s - from_s, from_s, until_s};
+  // NOW AT: the cameras measure the marker then and there, and half-way to it unless another walk begins.
+  void step(std::istringstream& words) {
+    const double before_now_s = now_s_, before_at_s = at_s_;
+    words >> now_s_ >> at_s_;
+    if (at_s_ >= before_at_s && at_s_ - before_at_s <= now_s_ - before_now_s + 1e-3)
+      measure_marker(std::midpoint(before_now_s, now_s_), std::midpoint(before_at_s, at_s_));
+    measure_marker(now_s_, at_s_);
   }
-  void show_marker(bool is_shown) { is_marker_shown_ = is_shown; }
 
-  // One turn of the session, a hundred times a second; the marker is measured thirty times a second.
+  void measure_marker(double now_s, double at_s) {
+    now_ = begun_at_ + std::chrono::nanoseconds(std::llround(1e9 * now_s));
+    Track track;
+    track.body = scene::viewer_body(setup_.scene.viewers.size() - 1);
+    track.world_from_body =
+        boxplus(walk_.eye(at_s) * marker_from_eye_.inverse(), noise(rng_, k_marker_rad, k_marker_m));
+    track.covariance.diagonal() << Vector3d::Constant(k_marker_rad * k_marker_rad),
+        Vector3d::Constant(k_marker_m * k_marker_m);
+    track.captured_at = track.at = now_;
+    session::Percepts percepts = percepts_;
+    percepts.captured_at = now_;
+    percepts.tracks.push_back(track);
+    session_->update_percepts(std::move(percepts), ++moments_);
+    turn();
+  }
+
+  // Exchanges everything with the server.
   void turn() {
-    const Stamp now = std::chrono::steady_clock::now();
-    if (is_marker_shown_ && seconds_between(measured_at_, now) > 1.0 / 30) {
-      measured_at_ = now;
-      Track track;
-      track.body = scene::viewer_body(setup_.scene.viewers.size() - 1);
-      track.world_from_body = boxplus(walk_.eye(walking_.at_s()) * marker_from_eye_.inverse(),
-                                      noise(rng_, k_marker_rad, k_marker_m));
-      track.covariance.diagonal() << Vector3d::Constant(k_marker_rad * k_marker_rad),
-          Vector3d::Constant(k_marker_m * k_marker_m);
-      track.captured_at = track.at = now;
-      session::Percepts percepts = percepts_;
-      percepts.captured_at = now;
-      percepts.tracks.push_back(track);
-      session_->update_percepts(std::move(percepts), ++moments_);
-    }
-    server_->apply_edits(&*session_, now);
-    server_->publish_state(*session_, *telemetry_, health_, now);
+    server_->apply_edits(&*session_, now_);
+    server_->publish_state(*session_, *telemetry_, health_, now_);
   }
 
-  // STATION X: the pose of an eye there, X beside the middle of both eyes.
-  json station_of(std::istringstream& words) const {
-    int index = 0;
-    double x = 0;
-    words >> index >> x;
-    const Pose eye = station(p_middle_, index) * Pose(Eigen::Quaterniond::Identity(), {x, 0, 0});
+  // AT X
+  json eye_of(std::istringstream& words) const {
+    double at_s = 0, x = 0;
+    words >> at_s >> x;
+    const Pose eye = walk_.eye(at_s) * Pose(Eigen::Quaterniond::Identity(), {x, 0, 0});
     const Eigen::Quaterniond& q = eye.rotation;
     const Vector3d& t = eye.translation;
     return {{"world_from_view", {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}}};
@@ -277,9 +273,8 @@ class Room {
   std::size_t moments_ = 0;
   Walk walk_;
   Pose marker_from_eye_{exp_rotation({0.4, 1.2, -0.3}), {0.03, -0.07, 0.05}};
-  Walking walking_;
-  bool is_marker_shown_ = true;
-  Stamp measured_at_;
+  double now_s_ = 0, at_s_ = 0;
+  Stamp begun_at_ = std::chrono::steady_clock::now(), now_ = begun_at_;
   std::unique_ptr<remote::Server> server_;
 };
 
@@ -312,19 +307,13 @@ class Commands {
 
 json done_by(Room* room, const std::string& line) {
   std::istringstream words(line);
-  std::string command, value;
+  std::string command;
   words >> command;
   if (command == "mask") return room->mask_of(words);
-  if (command == "station") return room->station_of(words);
+  if (command == "eye") return room->eye_of(words);
   if (command == "projected") return room->projected_again();
-  if (command == "walk") {
-    double at_unix_s = 0, from_s = 0, until_s = 0;
-    words >> at_unix_s >> from_s >> until_s;
-    room->walk_on(at_unix_s, from_s, until_s);
-  } else if (command == "marker") {
-    words >> value;
-    room->show_marker(value == "on");
-  }
+  if (command != "step") return {{"error", "expected step, eye, mask or projected, found " + command}};
+  room->step(words);
   return {{"done", command}};
 }
 
