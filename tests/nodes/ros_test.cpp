@@ -6,9 +6,8 @@
 #include <unistd.h>
 
 #include <array>
-#include <bit>
 #include <chrono>
-#include <cstring>
+#include <cmath>
 #include <functional>
 #include <set>
 #include <thread>
@@ -127,6 +126,15 @@ FeedInput received_from(PoseFeeds& feeds, std::size_t count, std::size_t notes) 
   return all;
 }
 
+// A busy machine can lose some.
+testing::AssertionResult is_later_by_steps(const ForeignPose& first,
+                                           const ForeignPose& second,
+                                           double step_s) {
+  const double steps = (second.time_s.value() - first.time_s.value()) / step_s;
+  if (steps > 0.5 && std::abs(steps - std::round(steps)) < 1e-6) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << steps << " steps of " << step_s << " s";
+}
+
 TEST_F(Ros, PosesOfAnotherProgramArrive) {
   const Peer peer(domain, "publish");
   const auto port = open_ros_port();
@@ -146,7 +154,7 @@ TEST_F(Ros, PosesOfAnotherProgramArrive) {
       EXPECT_GE(*pose.time_s, 100);
       if (k > 0) {
         EXPECT_GE(arrived_at, input.poses[i][k - 1].arrived_at);
-        EXPECT_NEAR(*pose.time_s - *input.poses[i][k - 1].pose.time_s, 0.02, 1e-6);
+        EXPECT_TRUE(is_later_by_steps(input.poses[i][k - 1].pose, pose, 0.02));
       }
     }
   }
@@ -164,7 +172,7 @@ TEST_F(Ros, PosesWithoutNumbersOrInAnotherFrameAreRefusedInWords) {
   for (const auto& poses : input.poses) {
     ASSERT_GE(poses.size(), 5U);
     for (std::size_t k = 1; k < poses.size(); ++k)  // every second one is missing
-      EXPECT_NEAR(*poses[k].pose.time_s - *poses[k - 1].pose.time_s, 0.04, 1e-6);
+      EXPECT_TRUE(is_later_by_steps(poses[k - 1].pose, poses[k].pose, 0.04));
   }
   const auto has_note = [&](const std::string& words) {
     return std::ranges::any_of(input.notes,
