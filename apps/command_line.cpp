@@ -910,7 +910,7 @@ void add_live(CLI::App& app, Run& run) {
   command->add_option(
       "--poses-out", options->poses_out,
       "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
-      "freed or json; may be repeated");
+      "freed or json; or ros for ROS 2; may be repeated");
   command->add_option(
       "--room", options->room.room,
       "Name or folder of a room: devices with host in the devices file are at its other machines");

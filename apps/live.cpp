@@ -20,6 +20,8 @@
 #include "device/devices_file.h"
 #include "device/gl_context.h"
 #include "nodes/remote_devices.h"
+#include "nodes/ros_port.h"
+#include "nodes/ros_sender.h"
 #include "remote/server.h"
 #include "remote/tablet/tablet_view.h"
 #include "session/device_session.h"
@@ -208,6 +210,17 @@ session::Session::Drawing drawing_in(std::optional<device::GlContext>* context) 
           }};
 }
 
+// The way to ROS 2; null if nothing is received from it or sent to it.
+Result<std::unique_ptr<exchange::RosPort>> ros_port_for(const std::vector<session::FeedConfig>& trackers,
+                                                        const std::vector<std::string>& poses_out) {
+  const auto is_ros = [](const session::FeedConfig& tracker) {
+    return tracker.decoder.protocol == exchange::PoseProtocol::ros;
+  };
+  if (std::ranges::any_of(trackers, is_ros) || std::ranges::find(poses_out, "ros") != poses_out.end())
+    return nodes::open_ros_port();
+  return std::unique_ptr<exchange::RosPort>();
+}
+
 // Opens everything that sessions on devices and on the virtual rig have in common, calls `play`, and closes
 // it. `setup` becomes what a replay will read. `room` may be null.
 Status run_session(const LiveOptions& options,
@@ -221,13 +234,18 @@ Status run_session(const LiveOptions& options,
   log_info("live: {}", context->description());
   LIMN_TRY(session::OscPort osc, session::OscPort::open(options.osc, options.osc_to, options.osc_from));
   LIMN_TRY(const std::unique_ptr<remote::Server> server, serve(options, setup));
-  std::unique_ptr<session::PoseFeeds> feeds;
+  std::vector<session::FeedConfig> trackers;
   if (!options.trackers.empty()) {
-    LIMN_TRY(const std::vector<session::FeedConfig> trackers,
-             session::load_feeds(options.trackers, setup.scene));
-    LIMN_TRY(feeds, session::PoseFeeds::open(trackers));
-    for (const session::FeedConfig& tracker : trackers) setup.watch.feeds.push_back(tracker.setup);
+    LIMN_TRY(trackers, session::load_feeds(options.trackers, setup.scene));
   }
+  std::vector<std::string> poses_out = options.poses_out;
+  LIMN_TRY(const std::unique_ptr<exchange::RosPort> ros, ros_port_for(trackers, poses_out));
+  const bool is_sent_to_ros = std::erase(poses_out, "ros") > 0;
+  std::unique_ptr<session::PoseFeeds> feeds;
+  if (!trackers.empty()) {
+    LIMN_TRY(feeds, session::PoseFeeds::open(trackers, ros.get()));
+  }
+  for (const session::FeedConfig& tracker : trackers) setup.watch.feeds.push_back(tracker.setup);
   LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, options.record, &setup));
   LIMN_TRY(session::Perception perception, session::Perception::create(setup.scene, setup.rig, setup.watch));
   LIMN_TRY(session::Session session, session::Session::create(setup, &output.telemetry(), output.recorder()));
@@ -238,8 +256,10 @@ Status run_session(const LiveOptions& options,
     LIMN_TRY(console, session::OperatorConsole::open(*desktop, setup.scene));
     if (server) console->invite(server.get());
   }
-  LIMN_TRY(session::PoseSender sender, session::PoseSender::open(options.poses_out));
+  LIMN_TRY(session::PoseSender sender, session::PoseSender::open(poses_out));
+  nodes::RosSender ros_sender(ros.get());
   session::SessionParts parts{perception, session, output, {&osc, &sender}, feeds.get()};
+  if (is_sent_to_ros) parts.clients.push_back(&ros_sender);
   if (server) parts.clients.push_back(server.get());
   if (console) parts.clients.push_back(&*console);
   if (room) parts.clients.push_back(room);

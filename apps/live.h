@@ -38,7 +38,7 @@ struct LiveOptions {
   std::string osc_from;                ///< The only address whose OSC messages are accepted; empty: all.
   std::string osc_to;                  ///< HOST:PORT to which changes are sent by OSC; empty: none.
   std::filesystem::path trackers;      ///< limn.trackers/1: other tracking systems; empty: none.
-  std::vector<std::string> poses_out;  ///< PROTOCOL:HOST:PORT each, to which poses are sent.
+  std::vector<std::string> poses_out;  ///< PROTOCOL:HOST:PORT or ros each, to which poses are sent.
   std::string serve;                   ///< PORT or ADDRESS:PORT of the remote (docs/remote.md); empty: none.
   std::string serve_show;              ///< Projector that shows the remote's code at first; empty: none.
   RoomOptions room;                    ///< With devices: the room whose nodes have some of them.

@@ -1,42 +1,11 @@
 #include "nodes/engine.h"
 
-#include <dlfcn.h>
-
-#include <array>
-#include <cstdlib>
-#include <filesystem>
+#include "nodes/engine_library.h"
 
 namespace limn::nodes {
-namespace {
-
-namespace fs = std::filesystem;
-
-constexpr const char *k_library = "liblimn_room_dds.so", *k_variable = "LIMN_ROOM_ENGINE";
-
-fs::path engine_path() {
-  if (const char* chosen = std::getenv(k_variable); chosen && *chosen) return chosen;
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (const fs::path& folder : {program, program.parent_path() / "lib" / "limn"})
-    if (fs::exists(folder / k_library, ignored)) return folder / k_library;
-  return fs::path(LIMN_ENGINE_FOLDER) / k_library;
-}
-
-}  // namespace
 
 Result<std::unique_ptr<Engine>> make_engine(const EngineOptions& options, EngineEvents* events) {
-  const fs::path path = engine_path();
-  // It stays loaded, because its threads may still end after the engine is destroyed.
-  void* library = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-  void* function = library ? ::dlsym(library, k_make_engine) : nullptr;
-  if (!function) {
-    const char* why = ::dlerror();
-    return error(
-        "{}: expected the engine that connects the machines of a room, found: {}. Install the package "
-        "cyclonedds-dev "
-        "and build Limn again, or name the file in {}.",
-        path.string(), why ? why : "nothing", k_variable);
-  }
+  LIMN_TRY(void* function, engine_function(k_make_engine));
   std::string problem;
   std::unique_ptr<Engine> engine(reinterpret_cast<MakeEngine*>(function)(options, events, &problem));
   if (!engine) return Error{problem};

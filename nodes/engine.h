@@ -72,10 +72,8 @@ class Engine {
   virtual double longest_silence_s() = 0;
 };
 
-/// The engine's shared library, which is loaded at the first call: the file that the environment variable
-/// LIMN_ROOM_ENGINE names, else liblimn_room_dds.so beside the program, in ../lib/limn, or where it was
-/// built. `events` must outlive the engine. Error: it is not there, a library that it needs is not installed,
-/// or the engine's own.
+/// Loads the engine's shared library. `events` must outlive the engine. Error: engine_function()'s, or the
+/// engine's own.
 Result<std::unique_ptr<Engine>> make_engine(const EngineOptions& options, EngineEvents* events);
 
 /// The function that the shared library exports. `events` must outlive the engine. Null: it failed, and

@@ -65,10 +65,12 @@ FeedConfig read_feed(const ConfigNode& node, const std::map<std::string, tracker
              "unit", "quaternion"});
   FeedConfig feed;
   feed.setup.name = node.at("name").text();
-  feed.decoder.protocol = exchange::k_pose_protocols.read(node.at("protocol"));
-  feed.receive = read_place(node.at("receive"));
+  feed.decoder = exchange::read_decoder_options(node);
+  const bool is_ros = feed.decoder.protocol == exchange::PoseProtocol::ros;
+  if (!is_ros) feed.receive = read_place(node.at("receive"));
   if (const auto from = node.find("from")) {
     feed.from = device::numeric_address(from->text()).value_or("");
+    if (is_ros) from->problem("expected this key without the protocol ros, found it with it.");
     if (feed.from.empty())
       from->problem(
           fmt::format("expected a numeric address such as 192.168.7.20, found '{}'.", from->text()));
@@ -77,18 +79,11 @@ FeedConfig read_feed(const ConfigNode& node, const std::map<std::string, tracker
   if (const auto delay = node.find("delay_ms")) feed.setup.delay_s = 1e-3 * delay->number();
   if (!(feed.setup.delay_s >= 0 && feed.setup.delay_s <= 1))
     node.at("delay_ms").problem("expected 0 to 1000, found another number.");
-  if (const auto left = node.find("left_handed")) feed.decoder.is_left_handed = left->boolean();
-  const bool is_osc = feed.decoder.protocol == exchange::PoseProtocol::osc;
-  for (const char* key : {"unit", "quaternion"})
-    if (const auto other = node.find(key); other && !is_osc)
-      other->problem("expected this key with the protocol osc only, found it with another.");
-  if (const auto unit = node.find("unit"))
-    feed.decoder.osc.unit_m = unit->choice({"mm", "m"}) == "m" ? 1 : 1e-3;
-  if (const auto order = node.find("quaternion"))
-    feed.decoder.osc.has_real_part_last = order->choice({"wxyz", "xyzw"}) == "xyzw";
   const ConfigNode bodies = node.at("bodies");
   for (const std::string& sensor : bodies.keys()) {
     const tracker::FeedBody body = read_body(bodies.at(sensor), sensor, known);
+    if (const Status checked = exchange::check_sensor(feed.decoder, sensor); !checked)
+      bodies.at(sensor).problem(checked.message());
     const auto is_taken = [&](const tracker::FeedBody& other) { return other.body == body.body; };
     if (std::ranges::any_of(feed.setup.bodies, is_taken))
       bodies.at(sensor).problem("expected each body once, found it twice.");
@@ -115,15 +110,25 @@ Result<std::vector<FeedConfig>> load_feeds(const std::filesystem::path& path, co
   return feeds;
 }
 
-Result<std::unique_ptr<PoseFeeds>> PoseFeeds::open(const std::vector<FeedConfig>& configs) {
+Result<std::unique_ptr<PoseFeeds>> PoseFeeds::open(const std::vector<FeedConfig>& configs,
+                                                   exchange::RosPort* ros) {
   auto out = std::make_unique<PoseFeeds>();
   for (const FeedConfig& config : configs) {
-    auto socket = device::UdpSocket::receiving(config.receive);
-    if (!socket) return error("tracker {}: receive: {}", config.setup.name, socket.message());
-    log_info("live: receives poses of tracker {} ({}) at {}, UDP port {}", config.setup.name,
-             exchange::k_pose_protocols.text(config.decoder.protocol), config.receive.host, socket->port());
-    out->feeds_.push_back(
-        {config.setup.name, config.from, std::move(*socket), exchange::PoseDecoder(config.decoder)});
+    Feed feed{config.setup.name, config.from, exchange::PoseDecoder(config.decoder)};
+    if (config.decoder.protocol == exchange::PoseProtocol::ros) {
+      LIMN_CHECK(ros);
+      LIMN_TRY(feed.subscription, ros->subscribe(config.decoder.topic));
+      feed.ros = ros;
+    } else {
+      auto socket = device::UdpSocket::receiving(config.receive);
+      if (!socket) return error("tracker {}: receive: {}", config.setup.name, socket.message());
+      feed.socket = std::move(*socket);
+    }
+    log_info("live: receives poses of tracker {} ({}) at {}", feed.name,
+             exchange::k_pose_protocols.text(config.decoder.protocol),
+             feed.ros ? config.decoder.topic
+                      : fmt::format("{}, UDP port {}", config.receive.host, feed.socket->port()));
+    out->feeds_.push_back(std::move(feed));
   }
   return out;
 }
@@ -143,33 +148,41 @@ FeedInput PoseFeeds::received(Stamp at, bool is_real_time) {
   return out;
 }
 
-void PoseFeeds::receive(Stamp at, bool is_real_time, Stamp until, Feed* feed, FeedInput* out) {
+std::optional<PoseFeeds::Arrival> PoseFeeds::next_arrival(Feed* feed) {
+  if (feed->ros) {
+    const auto message = feed->ros->next(feed->subscription);
+    if (!message) return std::nullopt;
+    return Arrival{feed->decoder.decoded(message->poses), seconds_between(message->arrived_at, now())};
+  }
   std::array<std::uint8_t, exchange::k_longest_poses + 1> bytes{};
+  const auto datagram = feed->socket->next(bytes);
+  if (!datagram) return std::nullopt;
+  if (!feed->from.empty() && datagram->from != feed->from)
+    return Arrival{
+        error("expected datagrams of {} only (\"from\"), found one of {}", feed->from, datagram->from)};
+  const std::span<const std::uint8_t> received(bytes.data(), std::min(datagram->length, bytes.size()));
+  return Arrival{feed->decoder.decoded(received), datagram->age_s};
+}
+
+void PoseFeeds::receive(Stamp at, bool is_real_time, Stamp until, Feed* feed, FeedInput* out) {
   int count = 0;
   for (; count < k_most_at_once && now() < until; ++count) {
-    const auto datagram = feed->socket.next(bytes);
-    if (!datagram) break;
-    if (!feed->from.empty() && datagram->from != feed->from) {
-      refuse(fmt::format("expected datagrams of {} only (\"from\"), found one of {}", feed->from,
-                         datagram->from),
-             at, feed, out);
-      continue;
-    }
-    auto poses = feed->decoder.decoded({bytes.data(), std::min(datagram->length, bytes.size())});
-    if (!poses) {
-      refuse(poses.message(), at, feed, out);
+    auto arrival = next_arrival(feed);
+    if (!arrival) break;
+    if (!arrival->poses) {
+      refuse(arrival->poses.message(), at, feed, out);
       continue;
     }
     // On a virtual rig that is slow the session's clock goes slower than the wall's for a while.
     const Stamp arrived_at =
-        is_real_time ? std::clamp(shifted(at, -datagram->age_s), feed->read_at.value_or(Stamp{}), at) : at;
-    for (ForeignPose& pose : *poses) out->poses[0].push_back({std::move(pose), arrived_at});
+        is_real_time ? std::clamp(shifted(at, -arrival->age_s), feed->read_at.value_or(Stamp{}), at) : at;
+    for (ForeignPose& pose : *arrival->poses) out->poses[0].push_back({std::move(pose), arrived_at});
   }
   if (count < k_most_at_once) return;
   int thrown_away = 0;
-  while (thrown_away < k_most_thrown_away && now() < until && feed->socket.next(bytes)) ++thrown_away;
+  while (thrown_away < k_most_thrown_away && now() < until && next_arrival(feed)) ++thrown_away;
   if (thrown_away > 0)
-    refuse(fmt::format("expected at most {} datagrams in a frame, found {} more, which are left out",
+    refuse(fmt::format("expected at most {} messages in a frame, found {} more, which are left out",
                        k_most_at_once, thrown_away),
            at, feed, out);
 }

@@ -8,6 +8,7 @@
 #include "core/result.h"
 #include "device/udp_socket.h"
 #include "exchange/poses/pose_decoder.h"
+#include "exchange/poses/ros_port.h"
 #include "scene/scene.h"
 #include "session/perception.h"
 #include "tracker/feeds/foreign_tracker.h"
@@ -30,29 +31,38 @@ Result<std::vector<FeedConfig>> load_feeds(const std::filesystem::path& path, co
 /// buffers, which do not grow. Used by the thread of perception only.
 class PoseFeeds {
  public:
-  /// Opens a socket for each. Error: names the tracker.
-  static Result<std::unique_ptr<PoseFeeds>> open(const std::vector<FeedConfig>& configs);
+  /// Opens a socket or a subscription for each. `ros`, which must outlive this, is needed for ROS 2 only.
+  /// Error: names the tracker.
+  static Result<std::unique_ptr<PoseFeeds>> open(const std::vector<FeedConfig>& configs,
+                                                 exchange::RosPort* ros = nullptr);
 
   /// The poses that have arrived since the last call, one list for each tracker, and what people should know:
-  /// refusals, at most one a second for each tracker. At most k_most_at_once datagrams of each tracker and 5
+  /// refusals, at most one a second for each tracker. At most k_most_at_once messages of each tracker and 5
   /// ms in all; what a flood brings beyond that is thrown away, so that it does not fill the buffer. `at`:
   /// the session's present time. `is_real_time`: its clock runs as fast as that of the wall, and the moment
   /// of arrival is the one at which the system received the datagram.
   FeedInput received(Stamp at, bool is_real_time);
-  /// The port on which a tracker's poses are received.
-  int port(std::size_t feed) const { return feeds_[feed].socket.port(); }
+  /// The UDP port on which a tracker's poses are received.
+  int port(std::size_t feed) const { return feeds_[feed].socket->port(); }
 
   static constexpr int k_most_at_once = 64;
 
  private:
   struct Feed {
     std::string name, from;
-    device::UdpSocket socket;
     exchange::PoseDecoder decoder;
+    std::optional<device::UdpSocket> socket = {};
+    exchange::RosPort* ros = nullptr;  // instead of the socket
+    std::size_t subscription = 0;
     std::optional<Stamp> read_at = {};  // when received() was last called
     std::optional<Stamp> refused_at = {};
     std::size_t unreported = 0;
   };
+  struct Arrival {
+    Result<std::vector<ForeignPose>> poses;
+    double age_s = 0;
+  };
+  static std::optional<Arrival> next_arrival(Feed* feed);
   static void receive(Stamp at, bool is_real_time, Stamp until, Feed* feed, FeedInput* out);
   static void refuse(const std::string& why, Stamp at, Feed* feed, FeedInput* out);
 

@@ -53,10 +53,11 @@ Result<PoseSender> PoseSender::open(const std::vector<std::string>& targets) {
   for (const std::string& text : targets) {
     const auto colon = text.find(':');
     const auto protocol = exchange::k_pose_protocols.find(text.substr(0, colon));
-    if (colon == std::string::npos || !protocol || *protocol == exchange::PoseProtocol::osc)
+    if (colon == std::string::npos || !protocol || *protocol == exchange::PoseProtocol::osc ||
+        *protocol == exchange::PoseProtocol::ros)
       return usage_error(
-          "--poses-out: expected psn:HOST:PORT, freed:HOST:PORT or json:HOST:PORT (OSC: --osc-to), found "
-          "'{}'.",
+          "--poses-out: expected ros, psn:HOST:PORT, freed:HOST:PORT or json:HOST:PORT (OSC: --osc-to), "
+          "found '{}'.",
           text);
     const auto place = device::net_place(text.substr(colon + 1), "127.0.0.1");
     if (!place) return usage_error("--poses-out: {}", place.message());

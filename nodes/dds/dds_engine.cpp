@@ -1,4 +1,4 @@
-// The engine of a room on Eclipse Cyclone DDS: a shared library that nodes/engine.cpp loads.
+// The engine of a room on Eclipse Cyclone DDS: a shared library that nodes/engine_library.cpp loads.
 
 #include <dds/dds.h>
 #include <fmt/format.h>

@@ -2,14 +2,17 @@
 
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "exchange/poses/free_d.h"
 #include "exchange/poses/osc_message.h"
+#include "exchange/poses/pose_decoder.h"
 #include "exchange/poses/pose_json.h"
 #include "exchange/poses/pose_limits.h"
 #include "exchange/poses/pose_osc.h"
 #include "exchange/poses/posi_stage_net.h"
+#include "exchange/poses/ros_pose.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random.h"
 
@@ -338,6 +341,78 @@ TEST(PoseOsc, RefusesOtherArguments) {
   EXPECT_NE(refusal("/t/a/pose", {0.F, 0.F, 0.F, 0.F, 0.F, 0.F, 0.F}).find("quaternion"), std::string::npos);
   EXPECT_NE(refusal("/t/a/pose", {1e30F, 0.F, 0.F, 1.F, 0.F, 0.F, 0.F}).find("at most"), std::string::npos);
   EXPECT_FALSE(poses_of_osc(Bytes{1, 2, 3}));
+}
+
+// ---- ROS 2 ----
+
+RosPose good_ros_pose() { return {"map", "wand", 12, 500'000'000, {1, 2, 3}, {0, 0, 0.6, 0.8}}; }
+
+TEST(RosPose, GoesOutAndComesInAgain) {
+  std::mt19937_64 rng(5);
+  for (int i = 0; i < 50; ++i) {
+    const ForeignPose sent{"hat", some_pose(rng)};
+    const auto back = pose_of_ros(ros_pose(sent, "map", "hat", 1'700'000'000'250'000'000));
+    ASSERT_TRUE(back) << back.message();
+    EXPECT_EQ(back->sensor, "hat");
+    EXPECT_TRUE(test::pose_near(back->feed_from_sensor, sent.feed_from_sensor, 1e-6_deg, 1e-12));
+    EXPECT_NEAR(back->time_s.value_or(0), 1'700'000'000.25, 1e-6);
+  }
+  RosPose without_time = good_ros_pose();
+  without_time.s = 0;
+  without_time.ns = 0;
+  EXPECT_FALSE(pose_of_ros(without_time)->time_s);
+}
+
+TEST(RosPose, WhatCannotBeIsRefusedInWords) {
+  const auto message_of = [](auto change) {
+    RosPose pose = good_ros_pose();
+    change(pose);
+    const auto read = pose_of_ros(pose);
+    return read ? "read" : read.message();
+  };
+  EXPECT_EQ(message_of([](RosPose&) {}), "read");
+  const auto is_refused = [&](auto change, const std::string& words) {
+    EXPECT_NE(message_of(change).find("ROS 2 pose of '" + words), std::string::npos) << message_of(change);
+  };
+  constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
+  is_refused([](RosPose& pose) { pose.position_m[2] = k_nan; }, "wand': expected coordinates");
+  is_refused([](RosPose& pose) { pose.position_m[0] = 1e9; }, "wand': expected coordinates");
+  is_refused([](RosPose& pose) { pose.rotation_xyzw[3] = k_nan; }, "wand': expected a quaternion");
+  is_refused([](RosPose& pose) { pose.rotation_xyzw = {0, 0, 0, 0}; }, "wand': expected a quaternion");
+  is_refused([](RosPose& pose) { pose.frame = ""; }, "wand': frame_id: expected the name");
+  is_refused([](RosPose& pose) { pose.frame = std::string(256, 'a'); }, "wand': frame_id: expected the name");
+  is_refused([](RosPose& pose) { pose.frame = "a\nb"; }, "wand': frame_id: expected the name");
+  is_refused([](RosPose& pose) { pose.sensor = "\xff"; }, "?': child_frame_id: expected the name");
+  is_refused([](RosPose& pose) { pose.frame = "wand"; }, "wand': expected a pose in another frame");
+  is_refused([](RosPose& pose) { pose.ns = 1'000'000'000; }, "wand': stamp");
+}
+
+TEST(RosPose, ATrackerHasOneFrameAndNotTooManyPoses) {
+  PoseDecoder decoder({.protocol = PoseProtocol::ros, .osc = {}, .topic = "/tf", .sensors = {"wand"}});
+  RosPose other = good_ros_pose(), moved = good_ros_pose();
+  other.sensor = "other";
+  other.frame = "odom";
+  other.position_m[0] = std::numeric_limits<double>::infinity();
+  moved.frame = "odom";
+  const auto first = decoder.decoded(std::vector{other, good_ros_pose()});
+  ASSERT_TRUE(first) << first.message();
+  EXPECT_EQ(first->size(), 1U);
+  EXPECT_NE(
+      decoder.decoded(std::vector{moved}).message().find("frame_id: expected 'map', as before, found 'odom'"),
+      std::string::npos);
+  EXPECT_TRUE(decoder.decoded(std::vector(256, good_ros_pose())));
+  EXPECT_NE(decoder.decoded(std::vector(257, good_ros_pose())).message().find("at most 256"),
+            std::string::npos);
+}
+
+TEST(RosPose, NamesOfBodiesBecomeNamesOfTopics) {
+  const std::vector<std::string> names = {"mirror",     "viewer 1",     "viewer_1", "1st",
+                                          "T\xc3\xbcr", "\xe6\x89\x89", "a__b"};
+  const std::vector<std::string> expected = {"mirror", "viewer_1", "viewer_1_2", "body_1st",
+                                             "T_r",    "body_",    "a_b"};
+  EXPECT_EQ(ros_names(names), expected);
+  for (const std::string& name : ros_names(names))
+    EXPECT_TRUE(check_ros_topic("/limn/poses/" + name)) << name;
 }
 
 }  // namespace

@@ -48,11 +48,10 @@ const std::map<std::string, Names>& allowed() {
       {"session/drawing", {"core", "scene", "tracker", "projector"}},
       {"session", with({"gui", "exchange/poses", "wizard", "session/drawing"})},
       {"remote", with({"gui", "session", "session/drawing"})},
-      {"nodes", with({"gui", "wizard", "session", "session/drawing", "remote"})},
+      {"nodes", with({"gui", "exchange/poses", "wizard", "session", "session/drawing", "remote"})},
       {"validate", with({"wizard", "session", "session/drawing"})},
-      {"apps",
-       with({"gui", "exchange", "exchange/printing", "design", "wizard", "session", "session/drawing",
-             "remote", "nodes", "validate"})},
+      {"apps", with({"gui", "exchange", "exchange/printing", "design", "wizard", "session", "session/drawing",
+                     "remote", "nodes", "validate"})},
   };
   return arrows;
 }

@@ -1,0 +1,267 @@
+// Poses of ROS 2 on Eclipse Cyclone DDS, with the names and qualities of its middleware (rmw).
+
+#include <dds/dds.h>
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdlib>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "exchange/poses/pose_limits.h"
+#include "nodes/dds/qualities.h"
+#include "nodes/ros_port.h"
+#include "ros_poses.h"
+
+namespace limn::nodes {
+namespace {
+
+using exchange::RosMessage;
+using exchange::RosPose;
+using Header = std_msgs_msg_dds__Header_;
+using PoseStamped = geometry_msgs_msg_dds__PoseStamped_;
+using TransformStamped = geometry_msgs_msg_dds__TransformStamped_;
+using TransformMessage = tf2_msgs_msg_dds__TFMessage_;
+
+constexpr std::size_t k_most_waiting = 128;
+// The depths of rclcpp's default and of tf2's broadcaster.
+constexpr int32_t k_pose_depth = 10, k_transforms_depth = 100;
+
+const dds_topic_descriptor_t* type_of(bool has_transforms) {
+  return has_transforms ? &tf2_msgs_msg_dds__TFMessage__desc : &geometry_msgs_msg_dds__PoseStamped__desc;
+}
+
+Qos common_qos(bool has_transforms) {
+  Qos qos(dds_create_qos());
+  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
+  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, has_transforms ? k_transforms_depth : k_pose_depth);
+  const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
+  dds_qset_data_representation(qos.get(), 1, &xcdr1);
+  return qos;
+}
+// ROS 2's default. A slow subscriber loses samples; the session does not wait for it.
+Qos ros_writer_qos(bool has_transforms) {
+  Qos qos = common_qos(has_transforms);
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
+  return qos;
+}
+// Best effort, because such a reader hears reliable publishers, too; a reliable one would not hear the best
+// effort ones that many motion capture drivers have (rmw_qos_profile_sensor_data).
+Qos ros_reader_qos(bool has_transforms) {
+  Qos qos = common_qos(has_transforms);
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
+  dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
+  return qos;
+}
+
+std::string text_of(const char* text) { return text ? text : ""; }
+
+RosPose read_header(const Header& header, std::string sensor) {
+  RosPose out;
+  out.frame = text_of(header.frame_id);
+  out.sensor = std::move(sensor);
+  out.s = header.stamp.sec;
+  out.ns = header.stamp.nanosec;
+  return out;
+}
+
+RosPose read_pose(const PoseStamped& sample, const std::string& topic) {
+  RosPose out = read_header(sample.header, topic);
+  const auto& [p, q] = sample.pose;
+  out.position_m = {p.x, p.y, p.z};
+  out.rotation_xyzw = {q.x, q.y, q.z, q.w};
+  return out;
+}
+
+RosPose read_transform(const TransformStamped& sample) {
+  RosPose out = read_header(sample.header, text_of(sample.child_frame_id));
+  const auto& [p, q] = sample.transform;
+  out.position_m = {p.x, p.y, p.z};
+  out.rotation_xyzw = {q.x, q.y, q.z, q.w};
+  return out;
+}
+
+// Samples borrow the strings of the poses: Cyclone DDS's types have no const.
+Header header_of(const RosPose& pose) { return {{pose.s, pose.ns}, const_cast<char*>(pose.frame.c_str())}; }
+
+PoseStamped pose_sample(const RosPose& pose) {
+  const auto& p = pose.position_m;
+  const auto& q = pose.rotation_xyzw;
+  return {header_of(pose), {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}}};
+}
+
+TransformStamped transform_sample(const RosPose& pose) {
+  const auto& p = pose.position_m;
+  const auto& q = pose.rotation_xyzw;
+  return {header_of(pose),
+          const_cast<char*>(pose.sensor.c_str()),
+          {{p[0], p[1], p[2]}, {q[0], q[1], q[2], q[3]}}};
+}
+
+class DdsRosPort final : public exchange::RosPort {
+ public:
+  ~DdsRosPort() override {
+    if (domain_ > 0) dds_delete(domain_);
+  }
+  Status open(const RosNetwork& network);
+
+  Result<std::size_t> subscribe(const std::string& topic) override;
+  std::optional<RosMessage> next(std::size_t subscription) override;
+  Status publish_pose(const std::string& topic, const RosPose& pose) override;
+  Status publish_transforms(const std::string& topic, std::span<const RosPose> poses) override;
+
+ private:
+  struct Subscription {
+    std::string topic;
+    bool has_transforms = false;
+    std::mutex mutex;
+    std::deque<RosMessage> waiting;
+  };
+
+  Result<dds_entity_t> make_topic(const std::string& topic, bool has_transforms);
+  Result<dds_entity_t> writer_of(const std::string& topic, bool has_transforms);
+  static void notice_data(dds_entity_t reader, void* subscription);
+  static void keep(RosMessage message, Subscription* subscription);
+  static Error failed(const std::string& what, dds_return_t code) {
+    return error(
+        "ROS 2: {}: expected success, found: {}. Check the network, ROS_DOMAIN_ID and CYCLONEDDS_URI.", what,
+        dds_strretcode(code));
+  }
+
+  dds_entity_t domain_ = 0, participant_ = 0;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Subscription>> subscriptions_;
+  std::map<std::string, dds_entity_t> writers_;
+};
+
+Status DdsRosPort::open(const RosNetwork& network) {
+  constexpr const char* k_local =
+      "<CycloneDDS><Domain><General><Interfaces><NetworkInterface "
+      "address=\"127.0.0.1\"/></Interfaces></General>"
+      "</Domain></CycloneDDS>,";
+  const char* own = std::getenv("CYCLONEDDS_URI");
+  const std::string config = (network.is_local_only ? k_local : "") + text_of(own);
+  const auto domain = static_cast<dds_domainid_t>(network.domain);
+  domain_ = dds_create_domain(domain, config.c_str());
+  if (domain_ == DDS_RETCODE_PRECONDITION_NOT_MET)
+    return error(
+        "ROS 2: expected domain {} to be free in this program, found the room in it. Use another "
+        "ROS_DOMAIN_ID, or a room of another name.",
+        network.domain);
+  if (domain_ < 0) return failed(fmt::format("domain {}", network.domain), domain_);
+  participant_ = dds_create_participant(domain, nullptr, nullptr);
+  if (participant_ < 0) return failed(fmt::format("domain {}", network.domain), participant_);
+  return {};
+}
+
+Result<dds_entity_t> DdsRosPort::make_topic(const std::string& topic, bool has_transforms) {
+  const dds_entity_t made =
+      dds_create_topic(participant_, type_of(has_transforms), ("rt" + topic).c_str(), nullptr, nullptr);
+  if (made < 0) return failed("topic " + topic, made);
+  return made;
+}
+
+Result<std::size_t> DdsRosPort::subscribe(const std::string& topic) {
+  const bool has_transforms = exchange::has_transforms(topic);
+  auto subscription = std::make_unique<Subscription>();
+  subscription->topic = topic;
+  subscription->has_transforms = has_transforms;
+  LIMN_TRY(const dds_entity_t made, make_topic(topic, has_transforms));
+  const std::unique_ptr<dds_listener_t, decltype(&dds_delete_listener)> listener(
+      dds_create_listener(subscription.get()), &dds_delete_listener);
+  dds_lset_data_available(listener.get(), &DdsRosPort::notice_data);
+  const Qos qos = ros_reader_qos(has_transforms);
+  const std::lock_guard lock(mutex_);
+  subscriptions_.push_back(std::move(subscription));
+  const dds_entity_t reader = dds_create_reader(participant_, made, qos.get(), listener.get());
+  if (reader < 0) return failed("topic " + topic, reader);
+  return subscriptions_.size() - 1;
+}
+
+void DdsRosPort::notice_data(dds_entity_t reader, void* argument) {
+  constexpr std::size_t k_batch = 8;
+  auto* subscription = static_cast<Subscription*>(argument);
+  const Stamp arrived_at = now();
+  for (int count = static_cast<int>(k_batch); count == static_cast<int>(k_batch);) {
+    std::array<void*, k_batch> samples{};
+    std::array<dds_sample_info_t, k_batch> infos{};
+    count = dds_take(reader, samples.data(), infos.data(), k_batch, k_batch);
+    for (std::size_t i = 0; static_cast<int>(i) < count; ++i) {
+      if (!infos[i].valid_data) continue;
+      RosMessage message{{}, arrived_at};
+      if (subscription->has_transforms) {
+        const auto& list = static_cast<const TransformMessage*>(samples[i])->transforms;
+        // One more than is accepted, so that longer messages are refused.
+        for (std::uint32_t k = 0; k < list._length && k <= exchange::k_most_poses; ++k)
+          message.poses.push_back(read_transform(list._buffer[k]));
+      } else {
+        message.poses.push_back(read_pose(*static_cast<const PoseStamped*>(samples[i]), subscription->topic));
+      }
+      keep(std::move(message), subscription);
+    }
+    if (count > 0) dds_return_loan(reader, samples.data(), count);
+  }
+}
+
+void DdsRosPort::keep(RosMessage message, Subscription* subscription) {
+  const std::lock_guard lock(subscription->mutex);
+  if (subscription->waiting.size() == k_most_waiting) subscription->waiting.pop_front();
+  subscription->waiting.push_back(std::move(message));
+}
+
+std::optional<RosMessage> DdsRosPort::next(std::size_t subscription) {
+  Subscription* at = nullptr;
+  {
+    const std::lock_guard lock(mutex_);
+    at = subscriptions_.at(subscription).get();
+  }
+  const std::lock_guard lock(at->mutex);
+  if (at->waiting.empty()) return std::nullopt;
+  RosMessage message = std::move(at->waiting.front());
+  at->waiting.pop_front();
+  return message;
+}
+
+Result<dds_entity_t> DdsRosPort::writer_of(const std::string& topic, bool has_transforms) {
+  const std::lock_guard lock(mutex_);
+  if (const auto known = writers_.find(topic); known != writers_.end()) return known->second;
+  LIMN_TRY(const dds_entity_t made, make_topic(topic, has_transforms));
+  const Qos qos = ros_writer_qos(has_transforms);
+  const dds_entity_t writer = dds_create_writer(participant_, made, qos.get(), nullptr);
+  if (writer < 0) return failed("topic " + topic, writer);
+  writers_[topic] = writer;
+  return writer;
+}
+
+Status DdsRosPort::publish_pose(const std::string& topic, const RosPose& pose) {
+  LIMN_TRY(const dds_entity_t writer, writer_of(topic, false));
+  const PoseStamped sample = pose_sample(pose);
+  const dds_return_t code = dds_write(writer, &sample);
+  if (code < 0 && code != DDS_RETCODE_TIMEOUT) return failed("topic " + topic, code);
+  return {};
+}
+
+Status DdsRosPort::publish_transforms(const std::string& topic, std::span<const RosPose> poses) {
+  LIMN_TRY(const dds_entity_t writer, writer_of(topic, true));
+  std::vector<TransformStamped> transforms;
+  for (const RosPose& pose : poses) transforms.push_back(transform_sample(pose));
+  const auto count = static_cast<std::uint32_t>(transforms.size());
+  const TransformMessage sample{{count, count, transforms.data(), false}};
+  const dds_return_t code = dds_write(writer, &sample);
+  if (code < 0 && code != DDS_RETCODE_TIMEOUT) return failed("topic " + topic, code);
+  return {};
+}
+
+}  // namespace
+}  // namespace limn::nodes
+
+extern "C" __attribute__((visibility("default"))) limn::exchange::RosPort* limn_open_ros_port(
+    const limn::nodes::RosNetwork& network, std::string* problem) {
+  auto port = std::make_unique<limn::nodes::DdsRosPort>();
+  const limn::Status opened = port->open(network);
+  if (opened) return port.release();
+  *problem = opened.message();
+  return nullptr;
+}
