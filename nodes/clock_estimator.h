@@ -48,10 +48,11 @@ struct ClockEstimate {
 /// as long as the change of rates (temperature) permits: the noisier the network, the longer.
 ///
 /// `stddev_s` says what queues and rates leave open. For one-sided delays, the true offset is within two of
-/// them in 90 to 98 % of all moments. It is too small for delays that are normally distributed about a mean,
-/// which queues do not make. The shortest delays of the two directions are taken to be equal: nothing in the
-/// exchanges can show the contrary. If they differ, the offset is wrong by half the difference, at most half
-/// the shortest round trip; `stddev_s` does not contain this, `most_asymmetry_s()` is its bound.
+/// them in 90 to 98 % of all moments, in the first seconds in more. It is too small for delays that
+/// are normally distributed about a mean, which queues do not make. The shortest delays of the two directions
+/// are taken to be equal: nothing in the exchanges can show the contrary. If they differ, the offset is wrong
+/// by half the difference, at most half the shortest round trip; `stddev_s` does not contain this,
+/// `most_asymmetry_s()` is its bound.
 ///
 /// Exchanges below the line contradict it: a clock has stepped (a laptop was suspended), or NTP changes its
 /// rate. After two in a row that are far below, or three that are clearly below, only these count, and the
@@ -88,7 +89,7 @@ class ClockEstimator {
     double round_trip_s() const { return there_s + back_s; }
   };
   struct RatePrior {
-    double mean = 0, stddev = 100e-6;  // quartz clocks differ by less
+    double mean = 0, stddev = 50e-6;  // two quartz clocks differ by 100 ppm at most
   };
 
   // How far an exchange is below the lines; at most one is greater than 0. Both are 0 if it is below both:

@@ -32,7 +32,6 @@ class WireReading {
   Moment message(const limn_v1_Moment& in);
   ClockRequest message(const limn_v1_ClockRequest& in);
   ClockAnswer message(const limn_v1_ClockAnswer& in);
-  Sighting message(const limn_v1_Sighting& in);
   Order message(const limn_v1_Order& in);
   Answer message(const limn_v1_Answer& in);
   Health message(const limn_v1_Health& in);
@@ -72,7 +71,6 @@ class WireReading {
   static scene::PosedPart part(const limn_v1_PosedPart& in);
   static scene::RoomLight light(const limn_v1_RoomLight& in);
   static scene::PosedScene posed(const limn_v1_PosedScene& in);
-  static tracker::Detection detection(const limn_v1_Detection& in);
   static OfferedDevice device(const limn_v1_OfferedDevice& in) { return {text(in.name), size(in.size)}; }
   Track track(const limn_v1_Track& in);
   Imager imager(const limn_v1_Imager& in);
@@ -243,29 +241,6 @@ ClockAnswer WireReading::message(const limn_v1_ClockAnswer& in) {
   return {text(in.to), in.number, stamp(in.asked_at), stamp(in.received_at), stamp(in.sent_at)};
 }
 
-tracker::Detection WireReading::detection(const limn_v1_Detection& in) {
-  tracker::Detection out;
-  out.marker = marker(in.marker);
-  for (std::size_t i = 0; i < 4; ++i) {
-    out.corners_px[i] = Eigen::Vector2d(in.corners[i].px);
-    out.corner_covariance[i] = Eigen::Matrix2d(in.corners[i].covariance);
-    out.corner_visible[i] = in.corners[i].is_visible;
-  }
-  out.score = in.score;
-  return out;
-}
-
-Sighting WireReading::message(const limn_v1_Sighting& in) {
-  Sighting out;
-  out.camera = text(in.camera);
-  out.number = in.number;
-  out.captured_at = stamp(in.captured_at);
-  out.detections = list(in.detections, &WireReading::detection);
-  out.detect_ms = in.detect_ms;
-  out.jpeg = bytes(in.jpeg);
-  return out;
-}
-
 Order WireReading::message(const limn_v1_Order& in) {
   Order out;
   out.to = text(in.to);
@@ -326,8 +301,6 @@ Result<Received> from_wire(Topic topic, const void* sample, Stamp arrived_at) {
       return received<limn_v1_ClockRequest>(sample, arrived_at);
     case Topic::clock_answer:
       return received<limn_v1_ClockAnswer>(sample, arrived_at);
-    case Topic::sighting:
-      return received<limn_v1_Sighting>(sample, arrived_at);
     case Topic::order:
       return received<limn_v1_Order>(sample, arrived_at);
     case Topic::answer:

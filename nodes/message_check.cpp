@@ -206,21 +206,6 @@ void check(const Setup& setup, MessageCheck* to) {
   }
 }
 
-void check(const Sighting& sighting, MessageCheck* to) {
-  to->text("camera", sighting.camera);
-  to->count("detections", sighting.detections);
-  for (const tracker::Detection& detection : sighting.detections) {
-    to->text("detection.marker", detection.marker.family + detection.marker.id);
-    for (std::size_t i = 0; i < 4; ++i) {
-      to->finite_matrix("detection.corners", detection.corners_px[i]);
-      to->finite_matrix("detection.corners", detection.corner_covariance[i]);
-    }
-    to->finite("detection.score", {detection.score});
-  }
-  to->finite("detect_ms", {sighting.detect_ms});
-  to->bytes("jpeg", sighting.jpeg);
-}
-
 void check_receiver(const std::string& machine, MessageCheck* to) {
   to->require(is_node_name(machine), "to", "a machine's name");
 }

@@ -9,7 +9,6 @@
 
 #include "core/frame.h"
 #include "session/drawing/frame_description.h"
-#include "tracker/detection.h"
 
 namespace limn::nodes {
 
@@ -86,16 +85,6 @@ struct ClockAnswer {
   Stamp sent_at;
 };
 
-/// The markers in one image of a node's camera. Best effort; the newest of each camera wins.
-struct Sighting {
-  std::string camera;  ///< the rig's name
-  std::uint64_t number = 0;
-  Stamp captured_at;  ///< on the host's clock
-  std::vector<tracker::Detection> detections;
-  double detect_ms = 0;
-  std::string jpeg = {};  ///< the image, where the host wants it; else empty
-};
-
 /// Asks a node to do something. Reliable; answered by an Answer with the same number.
 struct Order {
   enum class What {
@@ -139,6 +128,6 @@ struct Health {
 struct Departure {};
 
 using Message =
-    std::variant<Offer, Setup, Moment, ClockRequest, ClockAnswer, Sighting, Order, Answer, Health, Departure>;
+    std::variant<Offer, Setup, Moment, ClockRequest, ClockAnswer, Order, Answer, Health, Departure>;
 
 }  // namespace limn::nodes

@@ -9,7 +9,6 @@ namespace limn::nodes {
 namespace {
 
 constexpr auto k_receive_wait = std::chrono::milliseconds(20);
-constexpr std::size_t k_most_sightings = 64;  // from all cameras; older ones are useless
 
 }  // namespace
 
@@ -83,9 +82,6 @@ void Room::note(Received received) {
   } else if (auto* done = std::get_if<Answer>(&received.message)) {
     if (const auto waiting = answers_.find(done->number); waiting != answers_.end())
       waiting->second = std::move(*done);
-  } else if (auto* sighting = std::get_if<Sighting>(&received.message)) {
-    sightings_.push_back(std::move(*sighting));
-    if (sightings_.size() > k_most_sightings) sightings_.pop_front();
   } else if (auto* health = std::get_if<Health>(&received.message)) {
     if (is_known) machine->second.health = std::move(*health);
     return;
@@ -188,14 +184,6 @@ Result<Answer> Room::ask(Order order, double limit_s) {
   if (!answer) return error("{}: expected an answer within {:.1f} s, found none.", node, limit_s);
   if (!answer->error.empty()) return error("{}: {}", node, answer->error);
   return *answer;
-}
-
-std::vector<Sighting> Room::take_sightings(std::chrono::nanoseconds limit) {
-  std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, limit, [&] { return !sightings_.empty(); });
-  std::vector<Sighting> out(std::move_iterator(sightings_.begin()), std::move_iterator(sightings_.end()));
-  sightings_.clear();
-  return out;
 }
 
 }  // namespace limn::nodes

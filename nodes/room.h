@@ -3,7 +3,6 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
-#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -63,8 +62,6 @@ class Room {
   /// For the host: sends an order and waits for its answer. Error: the node's message, no answer in time, or
   /// no such machine.
   Result<Answer> ask(Order order, double limit_s);
-  /// For the host: what cameras on nodes have seen since the last call; waits up to `limit` for something.
-  std::vector<Sighting> take_sightings(std::chrono::nanoseconds limit);
 
  private:
   void run();
@@ -86,7 +83,6 @@ class Room {
   std::optional<std::pair<Setup, Sender>> setup_;
   std::vector<ReceivedOrder> waiting_orders_;
   std::map<std::uint64_t, std::optional<Answer>> answers_;  // by order that somebody waits for
-  std::deque<Sighting> sightings_;
   bool has_arrived_ = false;
   std::atomic<bool> is_stopping_ = false;
   std::thread thread_;

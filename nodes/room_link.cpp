@@ -24,7 +24,8 @@ namespace {
 // The offer is repeated, because a machine that was silent for a while counts as there again with its next
 // offer.
 constexpr auto k_offer_interval = std::chrono::seconds(1);
-constexpr std::uint64_t k_most_warnings = 20;  // the engine's, for each link
+constexpr std::size_t k_most_warnings = 20;  // different texts
+constexpr double k_problem_s = 10;
 
 // The machine that a message is for; null: it is for all.
 const std::string* receiver_of(const Message& message) {
@@ -36,11 +37,9 @@ const std::string* receiver_of(const Message& message) {
       message);
 }
 
-// What a best-effort message replaces: the one of the same kind, sender and camera.
+// What a best-effort message replaces: the one of the same kind and sender.
 bool is_replaced(const Received& old, const Received& fresh) {
-  if (old.message.index() != fresh.message.index() || old.from != fresh.from) return false;
-  const auto *one = std::get_if<Sighting>(&old.message), *other = std::get_if<Sighting>(&fresh.message);
-  return !one || one->camera == other->camera;
+  return old.message.index() == fresh.message.index() && old.from == fresh.from;
 }
 
 // Seconds on a clock that also counts while the machine sleeps.
@@ -60,6 +59,7 @@ class EngineLink final : public RoomLink, private EngineEvents {
   Status send(const Message& message) override;
   std::vector<Received> take_messages(std::chrono::nanoseconds wait) override;
   LinkCounts counts() const override;
+  std::vector<std::string> problems() const override;
 
  private:
   void receive_sample(Topic topic, const void* sample, Stamp arrived_at) override;
@@ -87,6 +87,8 @@ class EngineLink final : public RoomLink, private EngineEvents {
   bool has_waiting_ = false;                      // in the engine
   std::optional<Message> own_offer_, own_setup_;  // what was sent last
   LinkCounts counts_;
+  std::map<std::string, Stamp> problems_;  // and when each came last
+  std::set<std::string> printed_;
   std::mutex taking_;
   std::shared_mutex engine_mutex_;  // locked alone by who changes the pointer
   std::unique_ptr<Engine> engine_;  // null: it could not be made again
@@ -221,9 +223,24 @@ void EngineLink::notice_waiting() {
 void EngineLink::notice_warning(const std::string& text) {
   {
     const std::lock_guard lock(mutex_);
-    if (++counts_.warnings > k_most_warnings) return;
+    ++counts_.warnings;
+    const Stamp at = now();
+    if (problems_.size() >= k_most_warnings && !problems_.contains(text))
+      std::erase_if(problems_,
+                    [at](const auto& entry) { return seconds_between(entry.second, at) > k_problem_s; });
+    if (problems_.size() >= k_most_warnings && !problems_.contains(text)) return;
+    problems_[text] = at;
+    if (printed_.size() >= k_most_warnings || !printed_.insert(text).second) return;
   }
   log_warning("room: {}", text);
+}
+
+std::vector<std::string> EngineLink::problems() const {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> out;
+  for (const auto& entry : problems_)
+    if (seconds_between(entry.second, now()) <= k_problem_s) out.push_back(entry.first);
+  return out;
 }
 
 // Runs on a thread of its own: what takes the engine long, the repeated offer, and the return after a long

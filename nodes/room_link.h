@@ -31,7 +31,7 @@ struct RoomLinkOptions {
 struct LinkCounts {
   std::uint64_t received = 0;
   std::uint64_t refused = 0;   ///< messages whose content was not valid; they are left out
-  std::uint64_t warnings = 0;  ///< the engine's; the first are printed
+  std::uint64_t warnings = 0;  ///< the engine's
   std::uint64_t entries = 1;   ///< how often the room was entered: again after a long sleep
 };
 
@@ -45,15 +45,18 @@ class RoomLink {
   virtual const Sender& self() const = 0;
   /// Sends to all machines; ClockRequest, ClockAnswer, Order and Answer are received by the machine `to`
   /// only. A program sends its Offer first, so that the others know of it, and again when it changes. Setup,
-  /// Moment and Order can be sent by a host only, Sighting by a node only; Setup, Moment and Order come to
-  /// nodes only, Sighting to the host only. Order and Answer wait up to 2 s until `to` is connected and has
+  /// Moment and Order can be sent by a host only; Setup, Moment and Order come to
+  /// nodes only. Order and Answer wait up to 2 s until `to` is connected and has
   /// taken earlier ones. Error: the content is not valid (message_check.h), nobody named `to` is there, or
   /// the engine's message. Departure cannot be sent.
   virtual Status send(const Message& message) = 0;
   /// What has arrived since the last call; waits up to `wait` for something. Of best-effort messages only the
-  /// newest of each sender (and camera) is kept. Own messages are not received.
+  /// newest of each sender is kept. Own messages are not received.
   virtual std::vector<Received> take_messages(std::chrono::nanoseconds wait) = 0;
   virtual LinkCounts counts() const { return {}; }
+  /// The engine's warnings of the last 10 seconds, as sentences for people: programs with other keys that
+  /// want to enter, no network. Each is also printed when it comes for the first time.
+  virtual std::vector<std::string> problems() const { return {}; }
 };
 
 /// Opens the connection. The engine is loaded now and only now (a shared library beside the program), so that

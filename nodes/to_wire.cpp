@@ -48,7 +48,6 @@ class WireFilling {
   void light(const scene::RoomLight& in, limn_v1_RoomLight* out);
   void posed(const scene::PosedScene& in, limn_v1_PosedScene* out);
   static void track(const Track& in, limn_v1_Track* out);
-  static void detection(const tracker::Detection& in, limn_v1_Detection* out);
 
   void overlay(const projector::SplitOverlay& in, limn_v1_Overlay* out);
   void overlay(const projector::GridOverlay& in, limn_v1_Overlay* out);
@@ -61,7 +60,6 @@ class WireFilling {
   void message(const Moment& in, limn_v1_Moment* out);
   void message(const ClockRequest& in, limn_v1_ClockRequest* out);
   void message(const ClockAnswer& in, limn_v1_ClockAnswer* out);
-  void message(const Sighting& in, limn_v1_Sighting* out);
   void message(const Order& in, limn_v1_Order* out);
   void message(const Answer& in, limn_v1_Answer* out);
   void message(const Health& in, limn_v1_Health* out);
@@ -283,26 +281,6 @@ void WireFilling::message(const ClockAnswer& in, limn_v1_ClockAnswer* out) {
   out->sent_at = nanoseconds_of(in.sent_at);
 }
 
-void WireFilling::detection(const tracker::Detection& in, limn_v1_Detection* out) {
-  marker(in.marker, &out->marker);
-  for (std::size_t i = 0; i < 4; ++i) {
-    limn_v1_Corner& corner = out->corners[i];
-    std::copy_n(in.corners_px[i].data(), 2, corner.px);
-    std::copy_n(in.corner_covariance[i].data(), 4, corner.covariance);
-    corner.is_visible = in.corner_visible[i];
-  }
-  out->score = in.score;
-}
-
-void WireFilling::message(const Sighting& in, limn_v1_Sighting* out) {
-  text(in.camera, &out->camera);
-  out->number = in.number;
-  out->captured_at = nanoseconds_of(in.captured_at);
-  list(in.detections, &out->detections, &WireFilling::detection);
-  out->detect_ms = in.detect_ms;
-  bytes(in.jpeg, &out->jpeg);
-}
-
 void WireFilling::message(const Order& in, limn_v1_Order* out) {
   text(in.to, &out->to);
   out->number = in.number;
@@ -344,8 +322,6 @@ template <>
 struct WireOf<ClockRequest> : std::type_identity<limn_v1_ClockRequest> {};
 template <>
 struct WireOf<ClockAnswer> : std::type_identity<limn_v1_ClockAnswer> {};
-template <>
-struct WireOf<Sighting> : std::type_identity<limn_v1_Sighting> {};
 template <>
 struct WireOf<Order> : std::type_identity<limn_v1_Order> {};
 template <>

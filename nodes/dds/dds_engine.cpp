@@ -22,30 +22,11 @@ namespace {
 constexpr auto k_longest_match = std::chrono::seconds(2);
 
 // The topics that a role sends, and those that it receives.
-bool is_sent(Topic topic, bool is_host) {
-  switch (topic) {
-    case Topic::setup:
-    case Topic::moment:
-    case Topic::order:
-      return is_host;
-    case Topic::sighting:
-      return !is_host;
-    default:
-      return true;
-  }
+bool is_from_host(Topic topic) {
+  return topic == Topic::setup || topic == Topic::moment || topic == Topic::order;
 }
-bool is_received(Topic topic, bool is_host) {
-  switch (topic) {
-    case Topic::setup:
-    case Topic::moment:
-    case Topic::order:
-      return !is_host;
-    case Topic::sighting:
-      return is_host;
-    default:
-      return true;
-  }
-}
+bool is_sent(Topic topic, bool is_host) { return is_host || !is_from_host(topic); }
+bool is_received(Topic topic, bool is_host) { return !is_host || !is_from_host(topic); }
 
 class DdsEngine final : public Engine {
  public:
@@ -76,18 +57,20 @@ class DdsEngine final : public Engine {
   void take_samples(Topic topic, dds_entity_t reader);
   void report_presence(const limn_v1_Offer& offer, const dds_sample_info_t& info);
   static void notice_data(dds_entity_t reader, void* reading);
+  std::string in_words(std::string text) const;
   static void print(void* engine, const dds_log_data_t* data);
   Error failed(const char* what, dds_return_t code);
 
   EngineEvents* events_;
   bool is_host_ = false;
+  std::string room_;
   dds_entity_t domain_ = 0, participant_ = 0;
   std::array<dds_entity_t, k_topics> topics_{}, writers_{};
   std::array<Reading, k_topics> readings_;
   std::mutex directed_mutex_;
   Directed directed_;
-  std::mutex heard_mutex_;
-  std::map<dds_instance_handle_t, Stamp> heard_;  // when each matched program offered itself last
+  std::mutex met_mutex_;
+  std::map<dds_instance_handle_t, Stamp> met_;  // when each matched program offered itself last
   std::mutex log_mutex_;
   std::string last_log_;
 };
@@ -104,10 +87,28 @@ Error DdsEngine::failed(const char* what, dds_return_t code) {
                last_log_.empty() ? "" : ": ", last_log_);
 }
 
+// What the engine prints, in words for people; empty: it means nothing to them.
+std::string DdsEngine::in_words(std::string text) const {
+  const auto has = [&text](const char* part) { return text.find(part) != std::string::npos; };
+  if (has("malformed packet"))
+    return "datagrams come that are no program's of a room: something else uses its ports, or somebody "
+           "disturbs it.";
+  if (has("Certificate not valid") || has("handshake"))
+    return fmt::format(
+        "a program with other keys tries to enter a room named {}. If it belongs here, copy the folder with "
+        "the "
+        "room's keys to its machine; else rename one of the two rooms.",
+        room_);
+  if (has("Remote secure participant") && has("not allowed"))
+    return "";  // It came before this one was ready.
+  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  return text;
+}
+
 void DdsEngine::print(void* engine, const dds_log_data_t* data) {
   auto* self = static_cast<DdsEngine*>(engine);
-  std::string text = data->message;
-  while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
+  const std::string text = self->in_words(data->message);
+  if (text.empty()) return;
   self->events_->notice_warning(text);
   const std::lock_guard lock(self->log_mutex_);
   self->last_log_ = text;
@@ -115,6 +116,7 @@ void DdsEngine::print(void* engine, const dds_log_data_t* data) {
 
 Status DdsEngine::open(const EngineOptions& options) {
   is_host_ = options.is_host;
+  room_ = options.keys.name;
   LIMN_TRY(const std::string config, domain_config(options));
   LIMN_TRY(const Qos secure, secure_qos(options.keys));
   dds_set_log_sink(&DdsEngine::print, this);
@@ -185,8 +187,8 @@ void DdsEngine::report_presence(const limn_v1_Offer& offer, const dds_sample_inf
   if (info.instance_state != DDS_IST_ALIVE) {
     events_->notice_departure({offer.node ? offer.node : "", offer.run});
   } else if (info.valid_data) {
-    const std::lock_guard lock(heard_mutex_);
-    heard_[info.publication_handle] = now();
+    const std::lock_guard lock(met_mutex_);
+    met_[info.publication_handle] = now();
   }
 }
 
@@ -195,17 +197,17 @@ double DdsEngine::longest_silence_s() {
   const dds_entity_t reader = readings_[static_cast<std::size_t>(Topic::offer)].reader;
   std::array<dds_instance_handle_t, k_most> matched{};
   const dds_return_t count = dds_get_matched_publications(reader, matched.data(), k_most);
-  const std::lock_guard lock(heard_mutex_);
+  const std::lock_guard lock(met_mutex_);
   const Stamp at = now();
-  std::map<dds_instance_handle_t, Stamp> heard;
+  std::map<dds_instance_handle_t, Stamp> met;
   double longest_s = 0;
   for (std::size_t i = 0; i < std::min<std::size_t>(k_most, static_cast<std::size_t>(std::max(count, 0)));
        ++i) {
-    const auto known = heard_.find(matched[i]);
-    heard[matched[i]] = known == heard_.end() ? at : known->second;
-    longest_s = std::max(longest_s, seconds_between(heard[matched[i]], at));
+    const auto known = met_.find(matched[i]);
+    met[matched[i]] = known == met_.end() ? at : known->second;
+    longest_s = std::max(longest_s, seconds_between(met[matched[i]], at));
   }
-  heard_ = std::move(heard);
+  met_ = std::move(met);
   return longest_s;
 }
 

@@ -77,8 +77,6 @@ TopicDescription description_of(Topic topic) {
       return {"limn_v1_clock_request", &limn_v1_ClockRequest_desc};
     case Topic::clock_answer:
       return {"limn_v1_clock_answer", &limn_v1_ClockAnswer_desc};
-    case Topic::sighting:
-      return {"limn_v1_sighting", &limn_v1_Sighting_desc};
     case Topic::order:
       return {"limn_v1_order", &limn_v1_Order_desc};
     case Topic::answer:

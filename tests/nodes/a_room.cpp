@@ -32,12 +32,15 @@ ARoom::~ARoom() {
   fs::remove_all(temporary_, ignored);
 }
 
-std::unique_ptr<nodes::RoomLink> ARoom::open_link(const std::string& node, nodes::RoomRole role) const {
+std::unique_ptr<nodes::RoomLink> ARoom::open_link(const std::string& node,
+                                                  nodes::RoomRole role,
+                                                  const std::vector<std::string>& peers) const {
   nodes::RoomLinkOptions options;
   options.room = folder_;
   options.node = node;
   options.is_host = role == nodes::RoomRole::host;
   options.interfaces = {"lo"};
+  options.peers = peers;
   auto link = nodes::open_room_link(options).value();
   nodes::Offer offer;
   offer.is_host = options.is_host;
@@ -49,7 +52,8 @@ Peer::Peer(const fs::path& folder,
            const std::string& node,
            const std::string& role,
            const std::string& what,
-           std::uint64_t number) {
+           std::uint64_t number,
+           const std::string& peer) {
   std::array<int, 2> input{}, output{};
   LIMN_CHECK(::pipe2(input.data(), O_CLOEXEC) == 0 && ::pipe2(output.data(), O_CLOEXEC) == 0);
   const std::string count = std::to_string(number);
@@ -58,7 +62,7 @@ Peer::Peer(const fs::path& folder,
     ::dup2(input[0], STDIN_FILENO);
     ::dup2(output[1], STDOUT_FILENO);
     ::execl(LIMN_ROOM_PEER, "room_peer", folder.c_str(), node.c_str(), role.c_str(), what.c_str(),
-            count.c_str(), nullptr);
+            count.c_str(), peer.empty() ? nullptr : peer.c_str(), nullptr);
     ::_exit(127);
   }
   ::close(input[0]);

@@ -25,7 +25,9 @@ class ARoom {
   const std::filesystem::path& folder() const { return folder_; }
   const std::string& name() const { return name_; }
   /// A link of this process, which has offered itself.
-  std::unique_ptr<nodes::RoomLink> open_link(const std::string& node, nodes::RoomRole role) const;
+  std::unique_ptr<nodes::RoomLink> open_link(const std::string& node,
+                                             nodes::RoomRole role,
+                                             const std::vector<std::string>& peers = {}) const;
 
  private:
   std::filesystem::path temporary_, folder_;
@@ -40,7 +42,8 @@ class Peer {
        const std::string& node,
        const std::string& role,
        const std::string& what,
-       std::uint64_t number = 0);
+       std::uint64_t number = 0,
+       const std::string& peer = "");
   ~Peer();
   Peer(const Peer&) = delete;
   Peer& operator=(const Peer&) = delete;

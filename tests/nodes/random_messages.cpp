@@ -102,11 +102,6 @@ void fields(F& f, session::FrameDescription& x) {
       f(x.on_surface), f(x.signs), f(x.loose), f(x.is_black), f(x.is_moving), f(x.arriving);
 }
 template <class F>
-void fields(F& f, tracker::Detection& x) {
-  f(x.marker), f(x.score);
-  for (std::size_t i = 0; i < 4; ++i) f(x.corners_px[i]), f(x.corner_covariance[i]), f(x.corner_visible[i]);
-}
-template <class F>
 void fields(F& f, OfferedDevice& x) {
   f(x.name), f(x.size);
 }
@@ -115,17 +110,13 @@ void fields(F& f, SharedFile& x) {
   f.path(x.path), f.digest(x.sha256), f(x.bytes);
 }
 template <class F>
-void fields(F& f, Assignment& x) {
-  f.machine(x.node), f(x.device), f(x.name), f(x.size);
-}
-template <class F>
 void fields(F& f, Offer& x) {
   f(x.is_host), f(x.protocol), f(x.version), f(x.renderer), f(x.monitors), f(x.cameras), f(x.servers),
-      f(x.fingerprint);
+      f(x.fingerprint), f(x.token);
 }
 template <class F>
 void fields(F& f, Setup& x) {
-  f(x.revision), f(x.options), f(x.files), f(x.projectors), f(x.screens), f(x.cameras);
+  f(x.revision), f(x.devices), f(x.files);
 }
 template <class F>
 void fields(F& f, Moment& x) {
@@ -140,13 +131,8 @@ void fields(F& f, ClockAnswer& x) {
   f.machine(x.to), f(x.number), f(x.asked_at), f(x.received_at), f(x.sent_at);
 }
 template <class F>
-void fields(F& f, Sighting& x) {
-  f(x.camera), f(x.number), f(x.captured_at), f(x.detections), f(x.detect_ms), f.bytes(x.jpeg);
-}
-template <class F>
 void fields(F& f, Order& x) {
-  f.machine(x.to), f(x.number), f.one_of(x.what, 6), f(x.device), f(x.size), f(x.options), f.bytes(x.image),
-      f(x.at), f(x.is_on);
+  f.machine(x.to), f(x.number), f.one_of(x.what, 6), f(x.device), f.bytes(x.image), f(x.at);
 }
 template <class F>
 void fields(F& f, Answer& x) {
@@ -312,8 +298,8 @@ class Printing {
 }  // namespace
 
 Message random_message(std::size_t kind, std::uint64_t seed, const std::string& to) {
-  const std::array<Message, 9> kinds = {Offer{},    Setup{}, Moment{}, ClockRequest{}, ClockAnswer{},
-                                        Sighting{}, Order{}, Answer{}, Health{}};
+  const std::array<Message, 9> kinds = {Offer{},       Setup{}, Moment{}, ClockRequest{},
+                                        ClockAnswer{}, Order{}, Answer{}, Health{}};
   Message message = kinds.at(kind);
   Filling filling(seed, to);
   std::visit([&](auto& one) { fields(filling, one); }, message);

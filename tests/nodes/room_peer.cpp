@@ -1,5 +1,5 @@
-// A program that takes part in a room, for tests: room_peer FOLDER NAME host|node WHAT [NUMBER]. It prints
-// "ready" when it has entered, and leaves when its input ends.
+// A program that takes part in a room, for tests: room_peer FOLDER NAME host|node WHAT NUMBER [PEER…]. It
+// prints "ready" when it has entered, and leaves when its input ends.
 //
 //   offer NUMBER     offers itself as version NUMBER; answers orders with their own image, and clock requests
 //   moments BYTES    offers itself and sends a moment of that size 60 times a second
@@ -47,8 +47,8 @@ void answer_messages(RoomLink& link,
       send_or_warn(link,
                    test::random_message(order->number % 16, number + order->number / 16, received.from.node));
     else if (order)
-      send_or_warn(link, Answer{received.from.node, order->number, order->device, order->size, order->image,
-                                order->at});
+      send_or_warn(link,
+                   Answer{received.from.node, order->number, order->device, {}, order->image, order->at});
   }
 }
 
@@ -111,11 +111,12 @@ int run(const RoomLinkOptions& options, const std::string& what, std::uint64_t n
 }  // namespace limn
 
 int main(int count, char** words) {
-  if (count < 5) return 2;
+  if (count < 6) return 2;
   limn::nodes::RoomLinkOptions options;
   options.room = words[1];
   options.node = words[2];
   options.is_host = std::string(words[3]) == "host";
   options.interfaces = {"lo"};
-  return limn::run(options, words[4], count > 5 ? std::strtoull(words[5], nullptr, 10) : 0);
+  options.peers.assign(words + 6, words + count);
+  return limn::run(options, words[4], std::strtoull(words[5], nullptr, 10));
 }
