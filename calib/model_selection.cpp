@@ -19,6 +19,11 @@ constexpr const char* k_richer[] = {"LENSMODEL_OPENCV5", "LENSMODEL_OPENCV8"};
 // Share of the error; by chance, lenses that need no more values gain 1 or 2 %.
 constexpr double k_least_gain = 0.03;
 
+// A print's errors are believed where they gain so much, even if chance could do it: few poses leave much to
+// chance, and a bad print that passes for an exact one costs more than the opposite. Bad prints gain 0.2 to
+// 2, sheets that lie differently in each of four or five poses -0.5 to 0.3.
+constexpr double k_enough_gain = 0.2;
+
 // Chi-square of four values, 95 %: distortion beyond it is no chance.
 constexpr double k_distorted = 9.49;
 
@@ -165,6 +170,19 @@ Result<ModelSelection> solve_selecting_models(const Observations& observations, 
   LIMN_TRY(choice.solution, solve_from(observations, choice.options, choosing.best().solution));
   LIMN_TRY(choice.held_out, cross_validate(observations, choice.options, choice.solution));
   return choice;
+}
+
+Result<ModelSelection> solve_uneven_print(const Observations& observations, ModelSelection plain) {
+  const UnevenPrint print = uneven_print(observations, plain.options, plain.solution);
+  if (print.size == 0) return plain;
+  SolveOptions options = plain.options;
+  options.print_size = print.size;
+  options.square_pixels = print.are_pixels_square;
+  options.lens_models.clear();  // other lenses may be chosen, now that they need not imitate the print
+  LIMN_TRY(ModelSelection freed, solve_selecting_models(observations, options));
+  const Gain gain = gain_of(plain.held_out, freed.held_out);
+  const bool predicts_better = gain.share > std::min(gain.uncertainty, k_enough_gain);
+  return print.is_shown_by_pixels || predicts_better ? std::move(freed) : std::move(plain);
 }
 
 }  // namespace limn::calib

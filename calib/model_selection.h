@@ -43,4 +43,11 @@ extern const char* const k_auto_lens;
 Result<ModelSelection> solve_selecting_models(const Observations& observations,
                                               const SolveOptions& options = {});
 
+/// Solves again, with the print's errors as unknowns and lens models selected anew, where the observations
+/// show that the print is uneven (uneven_print); returns `plain` otherwise. Where only the corners' fit shows
+/// it, the held-out errors must be lower with the print's errors, too, by a fifth or by more than chance
+/// explains: a sheet that lies differently in each of few poses also fits better, but predicts the other
+/// poses worse.
+Result<ModelSelection> solve_uneven_print(const Observations& observations, ModelSelection plain);
+
 }  // namespace limn::calib

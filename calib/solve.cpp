@@ -310,6 +310,7 @@ bool has_pinhole(const Rig& rig) {
 
 // What costs less than a tenth of a millimetre of light.
 constexpr double k_least_aspect = 4e-4, k_least_smooth_m = 0.03e-3;
+constexpr double k_least_print_size = 7e-4;  // share; see calib_stated, "badly printed"
 constexpr double k_better_fit = 0.9;  // share of the corners' scatter; chance changes it by a hundredth
 
 bool are_square(const PixelAspect& pixels) {
@@ -403,10 +404,13 @@ UnevenPrint uneven_print(const Observations& observations,
   const bool is_visible = aspect > k_least_aspect || smooth_m > k_least_smooth_m;
   const bool fits_better = freed->corner_scatter_px < k_better_fit * solution.corner_scatter_px;
   const PixelAspect pixels = pixel_aspect(*freed);
-  if (!is_aspect_of_print(pixel_aspect(solution), pixels) && !(is_visible && fits_better)) return {};
-  // Smooth errors also lengthen the sheet, by about as much as they bend its lines.
+  const bool is_shown_by_pixels = is_aspect_of_print(pixel_aspect(solution), pixels);
+  if (!is_shown_by_pixels && !(is_visible && fits_better)) return {};
+  // Smooth errors also lengthen the sheet, by about as much as they bend its lines. Two sides that are wrong
+  // alike show little: an uneven print is as uncertain as office printers are, at least.
   const double half_m = (observations.board.width_m() + observations.board.height_m()) / 4;
-  return {std::hypot(aspect, std::sqrt(3.0) * smooth_m / half_m), are_square(pixels)};
+  return {std::hypot(aspect, std::sqrt(3.0) * smooth_m / half_m, k_least_print_size), are_square(pixels),
+          is_shown_by_pixels};
 }
 
 BoardShape board_shape(const Observations& observations, const Solution& solution) {

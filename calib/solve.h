@@ -130,6 +130,8 @@ Eigen::MatrixXd covariance_without(const Observations& observations,
 struct UnevenPrint {
   double size = 0;
   bool are_pixels_square = false;  ///< whether camera 0's pixels are, with the print's errors as unknowns
+  /// Whether they are square only so. Held-out errors do not show this: uneven pixels predict as well.
+  bool is_shown_by_pixels = false;
 };
 UnevenPrint uneven_print(const Observations& observations,
                          const SolveOptions& options,

@@ -24,9 +24,10 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using nlohmann::json;
 
-// The errors of a joint mrcal solve, measured in the same way (docs/measurements.md).
-constexpr double k_max_cells_px = 0.165, k_max_worst_cells_px = 0.228;
-constexpr double k_max_corners_px = 0.262, k_max_worst_corners_px = 0.385;
+// A joint mrcal solve, measured in the same way: cells 0.165 (worst pose 0.228), corners 0.262 (0.385). With
+// the print's errors as unknowns, which so few poses do not determine, Limn has 0.160 (0.200), 0.260 (0.369).
+constexpr double k_max_cells_px = 0.14, k_max_worst_cells_px = 0.187;
+constexpr double k_max_corners_px = 0.25, k_max_worst_corners_px = 0.36;
 constexpr double k_max_held_out_px = 0.20;
 
 wizard::SolveCommandOptions five_poses(const fs::path& data, const fs::path& out) {

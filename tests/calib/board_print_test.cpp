@@ -9,6 +9,7 @@
 
 #include "calib/judge/assess.h"
 #include "calib/judge/scale_bar.h"
+#include "calib/model_selection.h"
 #include "calib/solve.h"
 #include "tests/calib/bad_print.h"
 #include "tests/calib/true_rig.h"
@@ -235,6 +236,32 @@ TEST(BoardPrint, ABoardGluedFromTwoSheetsIsNamed) {
       return f.evidence.find("two sheets: from about its column ") != std::string::npos;
     });
     EXPECT_EQ(named != faults.end(), step_m > 0) << step_m << ": " << calib::to_text(faults);
+  }
+}
+
+// A sheet that lies differently in each of five poses: its corners fit better with a print's errors, too.
+TEST(BoardPrint, WhatPredictsNoOtherPoseIsNotTakenForABadPrint) {
+  std::mt19937_64 rng = test_rng();
+  constexpr int k_poses = 5;
+  const TrueRig truth =
+      make_true_rig({.k1 = -0.05, .shift = 0.5, .poses = k_poses, .square_pixels = true, .seed = 4});
+  for (const bool is_print : {true, false}) {
+    calib::Observations observations = observed_perfectly(truth, 4);
+    std::vector<calib::CornerObservation> corners;
+    for (int pose = 0; pose < k_poses; ++pose) {
+      calib::Observations one = observations;
+      std::erase_if(one.corners, [&](const calib::CornerObservation& seen) { return seen.pose != pose; });
+      print_corners(truth, {.aspect = 0, .phase = is_print ? 4 : 4 + 5.2 * pose}, &one);
+      corners.insert(corners.end(), one.corners.begin(), one.corners.end());
+    }
+    observations.corners = corners;
+    add_noise(0.03, 0.05, &rng, &observations);
+    const calib::ModelSelection plain = calib::solve_selecting_models(observations).value();
+    EXPECT_GT(calib::uneven_print(observations, plain.options, plain.solution).size, 0);
+    const calib::ModelSelection chosen = calib::solve_uneven_print(observations, plain).value();
+    printf("[ print    ] %s: held-out error %.3f px, then %.3f px\n", is_print ? "print" : "sheet",
+           plain.held_out.rms_px, chosen.held_out.rms_px);
+    EXPECT_EQ(chosen.solution.print.size() > 0, is_print);
   }
 }
 

@@ -55,22 +55,6 @@ Status check_models(const SolveCommandOptions& options) {
   return {};
 }
 
-// Solves again with the print's errors as unknowns where the observations show that it is uneven.
-Status solve_uneven_print(const calib::Observations& observations,
-                          const SolveCommandOptions& options,
-                          calib::SolveOptions* solving,
-                          calib::ModelSelection* choice) {
-  if (options.pixels_not_square) return {};
-  const calib::UnevenPrint print = calib::uneven_print(observations, *solving, choice->solution);
-  if (print.size == 0) return {};
-  solving->print_size = print.size;
-  solving->square_pixels = print.are_pixels_square;
-  solving->lens_models.clear();  // other lenses may be chosen, now that they need not imitate the print
-  LIMN_TRY(*choice, calib::solve_selecting_models(observations, *solving));
-  *solving = choice->options;
-  return {};
-}
-
 // Adds the corners of markers that several cameras see as tie points. Returns the markers' names.
 Result<std::vector<std::string>> add_markers(const calib::CaptureSet& captures,
                                              std::vector<std::string> families,
@@ -222,8 +206,10 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   const auto solving_begun = Clock::now();
   auto choice = calib::solve_selecting_models(observed.observations, solving);
   if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
+  if (!options.pixels_not_square) {
+    LIMN_TRY(*choice, calib::solve_uneven_print(observed.observations, std::move(*choice)));
+  }
   solving = choice->options;
-  LIMN_TRY_STATUS(solve_uneven_print(observed.observations, options, &solving, &*choice));
   std::vector<calib::DetectedMark> marks;
   if (!lengths.empty()) {
     LIMN_TRY(marks, scale_bar_marks(captures, choice->solution.rig, lengths));
