@@ -19,7 +19,7 @@ constexpr double k_rate_change = 10e-6, k_rate_slewed = 250e-6, k_slewed_s = 0.0
 // depends on: few, because the density changes with the distance from the line (Weibull, lognormal).
 constexpr std::size_t k_least_smallest = 10, k_window_per_smallest = 16, k_nearest = 5;
 constexpr double k_widening =
-    0.4;  // because the density often rises at the line, when several queues add up
+    1.35;  // because the density often rises at the line, when several queues add up
 constexpr int k_rates = 33, k_enough_rates = 12;  // at which the likelihood is computed; that matter
 constexpr double k_search_stddevs = 6;            // about the last rate
 constexpr double k_negligible = 9;                // a likelihood e^-9 times the largest

@@ -167,8 +167,10 @@ Covered covered(const Network& network, double wander_ppm, Rng* rng) {
   return {inside[0] / all[0], inside[1] / all[1]};
 }
 
-// 90 to 98 %. The shares of 100 pairs are known to a hundredth; those of 250 are between 91 and 97.6 %. In
-// the first seconds more may be within.
+// 90 to 98 %: the shares of 250 pairs are between 91 and 97.6 %. The moments of a pair depend on each other,
+// so the share of 100 pairs differs from the true one by up to 3 %. In the first seconds more may be within.
+constexpr double k_least_share = 0.875, k_most_share = 0.99;
+
 TEST(ClockEstimator, StatesAnHonestUncertainty) {
   Rng rng = test::test_rng();
   for (const Network& network :
