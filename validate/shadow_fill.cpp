@@ -147,6 +147,8 @@ class ShadowFillSession {
                                  sim::photograph(world_, traced.cameras[i], projected_, seed_ + frames_),
                                  at});
     shadows_->update(percepts, posed_, history_, &*renderer_);
+    const std::vector<cv::Mat>& maps = shadows_->maps();
+    for (std::size_t i = 0; i < maps.size(); ++i) renderer_->set_occlusion(i, maps[i]);
     ++frames_;
   }
 
