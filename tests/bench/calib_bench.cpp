@@ -18,6 +18,7 @@
 #include <set>
 
 #include "calib/board/board_dictionary.h"
+#include "calib/board_print.h"
 #include "calib/capture.h"
 #include "calib/judge/assess.h"
 #include "calib/solve.h"
@@ -424,6 +425,15 @@ void print_rows(const std::string& name, const TrueRig& truth, const Rig& rig, d
   fmt::print("\n");
 }
 
+// The true rig, larger by as much as lengths that are wrong by `wrong_m` make a print of known shape.
+Rig scaled_by_lengths(const TrueRig& truth, const Vector2d& wrong_m) {
+  const Vector2d lengths = calib::nominal_lengths(truth.board);
+  const double growth = wrong_m.dot(lengths) / lengths.squaredNorm();
+  Rig rig = truth.rig;
+  for (Imager& projector : rig.projectors) projector.imager_from_world.translation *= 1 + growth;
+  return rig;
+}
+
 // A bad print, solved from its folder as limn solve does it.
 Status run_paper(const Case& test_case, const fs::path& folder) {
   TrueRig truth = make_true_rig(test_case.options);
@@ -447,6 +457,8 @@ Status run_paper(const Case& test_case, const fs::path& folder) {
                truth, report->solution.rig, report->assessment.worst_predicted_mm());
     for (const calib::Fault& fault : report->assessment.faults)
       fmt::print("    {}: {}\n", calib::to_text(fault.name), fault.evidence);
+    if (stddev_mm > 0)
+      print_rows("true rig, scaled by these lengths", truth, scaled_by_lengths(truth, 1e-3 * wrong), 0);
   }
   print_rows("OpenCV", truth, opencv_rig(captures, opencv_views(captures)), 0);
   print_rows("true rig", truth, truth.rig, 0);
