@@ -91,7 +91,7 @@ struct Order {
     open_display,
     show,  ///< shows `image`
     open_camera,
-    grab,  ///< answers the next image that was exposed after `at`
+    grab,  ///< answers the next image; with `at`, one that was exposed later
     close_displays,
     close_cameras
   };

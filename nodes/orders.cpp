@@ -57,7 +57,7 @@ Status grab(const Order& order, const ClockEstimate& clock, NodeCameras* devices
   const Stamp begun = now(), after = clock.to_local(order.at);
   while (seconds_between(begun, now()) < k_grab_limit_s) {
     LIMN_TRY(const Frame frame, camera->next());
-    if (frame.captured_at <= after) continue;
+    if (order.at != Stamp() && frame.captured_at <= after) continue;
     answer->at = clock.to_other(frame.captured_at);
     answer->size = frame.image.size();
     if (frame.jpeg) {
