@@ -51,6 +51,16 @@ struct EngineOptions {
   double liveliness_s = 0.5;
 };
 
+/// What the engine knows of the other programs on the network.
+struct NeighbourState {
+  /// The longest time for which a program that the engine believes to be there has offered nothing. More than
+  /// k_memory_s means that it has forgotten this one, which happens when only one of them was silent, and
+  /// that the two do not meet again until this engine is closed and made again.
+  double longest_silence_s = 0;
+  /// Programs that name the same room and have not entered it within some seconds: their keys are others.
+  std::size_t strangers = 0;
+};
+
 /// A data-distribution engine: the one type of which a shared library is loaded only for sessions with a
 /// room.
 class Engine {
@@ -58,7 +68,8 @@ class Engine {
   virtual ~Engine() = default;
   /// Sends a struct of limn_room.idl to all receivers of the topic. Error: the engine's.
   virtual Status write(Topic topic, const void* sample) = 0;
-  /// Sends to one program, for directed topics; waits up to 2 s until it is connected and has room.
+  /// Sends to one program, for directed topics; waits up to 2 s until it is connected, and up to 2 s
+  /// until it has room.
   virtual Status write_to(const Sender& receiver, Topic topic, const void* sample) = 0;
   /// Connects the directed topics to a program early, so that write_to() need not wait.
   virtual void connect(const Sender& receiver) = 0;
@@ -66,10 +77,8 @@ class Engine {
   virtual void forget(const Sender& receiver) = 0;
   /// Reports samples that wait.
   virtual void take_waiting() = 0;
-  /// The longest time for which a program that the engine believes to be there has offered nothing. More than
-  /// k_memory_s means that it has forgotten this one, which happens when only one of them was silent, and
-  /// that the two will not meet again until this engine is closed and made again.
-  virtual double longest_silence_s() = 0;
+  /// The state of the others; to be called about once a second.
+  virtual NeighbourState neighbour_state() = 0;
 };
 
 /// Loads the engine's shared library. `events` must outlive the engine. Error: engine_function()'s, or the

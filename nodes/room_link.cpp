@@ -281,8 +281,19 @@ void EngineLink::repeat(const std::optional<Message>& message) {
 bool EngineLink::is_forgotten(double awake_s) {
   constexpr double k_margin_s = 2;
   if (seconds_with_sleep() - awake_s > k_memory_s - k_margin_s) return true;
-  const std::shared_lock lock(engine_mutex_);
-  return !engine_ || engine_->longest_silence_s() > k_memory_s + k_margin_s;
+  NeighbourState others;
+  {
+    const std::shared_lock lock(engine_mutex_);
+    if (!engine_) return true;
+    others = engine_->neighbour_state();
+  }
+  if (others.strangers > 0)
+    notice_warning(
+        fmt::format("a program with other keys tries to enter a room named {}. If it belongs here, copy the "
+                    "folder with the room's "
+                    "keys from here to its machine; else rename one of the two rooms.",
+                    options_.keys.name));
+  return others.longest_silence_s > k_memory_s + k_margin_s;
 }
 
 void EngineLink::enter_again() {

@@ -13,6 +13,7 @@
 
 #include "limn_room.h"
 #include "nodes/dds/domain_config.h"
+#include "nodes/dds/neighbourhood.h"
 #include "nodes/dds/qualities.h"
 #include "nodes/engine.h"
 
@@ -39,7 +40,7 @@ class DdsEngine final : public Engine {
   void connect(const Sender& receiver) override;
   void forget(const Sender& receiver) override;
   void take_waiting() override;
-  double longest_silence_s() override;
+  NeighbourState neighbour_state() override;
 
  private:
   struct Reading {
@@ -49,28 +50,28 @@ class DdsEngine final : public Engine {
   };
   struct Writing {
     dds_entity_t publisher = 0, writer = 0;
+    bool is_confirmed = false;  // by its receiver
   };
   using Directed = std::map<std::pair<Sender, Topic>, Writing>;
 
   Status open_topic(Topic topic, const EngineOptions& options, dds_entity_t subscriber);
   Result<dds_entity_t> directed_writer(const Sender& receiver, Topic topic);
+  dds_return_t begin_directed(const Sender& receiver, Topic topic, dds_entity_t writer, const void* sample);
   void take_samples(Topic topic, dds_entity_t reader);
   void report_presence(const limn_v1_Offer& offer, const dds_sample_info_t& info);
   static void notice_data(dds_entity_t reader, void* reading);
-  std::string in_words(std::string text) const;
+  static std::string in_words(std::string text);
   static void print(void* engine, const dds_log_data_t* data);
   Error failed(const char* what, dds_return_t code);
 
   EngineEvents* events_;
   bool is_host_ = false;
-  std::string room_;
   dds_entity_t domain_ = 0, participant_ = 0;
   std::array<dds_entity_t, k_topics> topics_{}, writers_{};
   std::array<Reading, k_topics> readings_;
   std::mutex directed_mutex_;
   Directed directed_;
-  std::mutex met_mutex_;
-  std::map<dds_instance_handle_t, Stamp> met_;  // when each matched program offered itself last
+  Neighbourhood neighbourhood_;
   std::mutex log_mutex_;
   std::string last_log_;
 };
@@ -88,17 +89,14 @@ Error DdsEngine::failed(const char* what, dds_return_t code) {
 }
 
 // What the engine prints, in words for people; empty: it means nothing to them.
-std::string DdsEngine::in_words(std::string text) const {
+std::string DdsEngine::in_words(std::string text) {
   const auto has = [&text](const char* part) { return text.find(part) != std::string::npos; };
-  if (has("malformed packet"))
+  if (has("malformed packet") || has("deserialization failed") || has("invalid parameter list") ||
+      has("Invalid ParticipantBuiltinTopicData"))
     return "datagrams come that are no program's of a room: something else uses its ports, or somebody "
            "disturbs it.";
-  if (has("Certificate not valid") || has("handshake"))
-    return fmt::format(
-        "a program with other keys tries to enter a room named {}. If it belongs here, copy the folder with "
-        "the "
-        "room's keys to its machine; else rename one of the two rooms.",
-        room_);
+  if (has("Certificate not valid") || has("handshake")) return "";  // NeighbourState::strangers
+  if (has("ddsi_udp_conn_write")) return "nothing can be sent: a cable is unplugged, or the network is down.";
   if (has("Remote secure participant") && has("not allowed"))
     return "";  // It came before this one was ready.
   while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
@@ -107,7 +105,7 @@ std::string DdsEngine::in_words(std::string text) const {
 
 void DdsEngine::print(void* engine, const dds_log_data_t* data) {
   auto* self = static_cast<DdsEngine*>(engine);
-  const std::string text = self->in_words(data->message);
+  const std::string text = in_words(data->message);
   if (text.empty()) return;
   self->events_->notice_warning(text);
   const std::lock_guard lock(self->log_mutex_);
@@ -116,7 +114,6 @@ void DdsEngine::print(void* engine, const dds_log_data_t* data) {
 
 Status DdsEngine::open(const EngineOptions& options) {
   is_host_ = options.is_host;
-  room_ = options.keys.name;
   LIMN_TRY(const std::string config, domain_config(options));
   LIMN_TRY(const Qos secure, secure_qos(options.keys));
   dds_set_log_sink(&DdsEngine::print, this);
@@ -130,6 +127,9 @@ Status DdsEngine::open(const EngineOptions& options) {
   if (subscriber < 0) return failed("making a subscriber", subscriber);
   for (std::size_t i = 0; i < k_topics; ++i)
     LIMN_TRY_STATUS(open_topic(static_cast<Topic>(i), options, subscriber));
+  const dds_entity_t offers = readings_[static_cast<std::size_t>(Topic::offer)].reader;
+  if (const dds_return_t code = neighbourhood_.open(participant_, offers); code < 0)
+    return failed("finding others", code);
   return {};
 }
 
@@ -187,29 +187,11 @@ void DdsEngine::report_presence(const limn_v1_Offer& offer, const dds_sample_inf
   if (info.instance_state != DDS_IST_ALIVE) {
     events_->notice_departure({offer.node ? offer.node : "", offer.run});
   } else if (info.valid_data) {
-    const std::lock_guard lock(met_mutex_);
-    met_[info.publication_handle] = now();
+    neighbourhood_.note_offer(info.publication_handle);
   }
 }
 
-double DdsEngine::longest_silence_s() {
-  constexpr std::size_t k_most = 256;
-  const dds_entity_t reader = readings_[static_cast<std::size_t>(Topic::offer)].reader;
-  std::array<dds_instance_handle_t, k_most> matched{};
-  const dds_return_t count = dds_get_matched_publications(reader, matched.data(), k_most);
-  const std::lock_guard lock(met_mutex_);
-  const Stamp at = now();
-  std::map<dds_instance_handle_t, Stamp> met;
-  double longest_s = 0;
-  for (std::size_t i = 0; i < std::min<std::size_t>(k_most, static_cast<std::size_t>(std::max(count, 0)));
-       ++i) {
-    const auto known = met_.find(matched[i]);
-    met[matched[i]] = known == met_.end() ? at : known->second;
-    longest_s = std::max(longest_s, seconds_between(met[matched[i]], at));
-  }
-  met_ = std::move(met);
-  return longest_s;
-}
+NeighbourState DdsEngine::neighbour_state() { return neighbourhood_.state(); }
 
 Status DdsEngine::write(Topic topic, const void* sample) {
   const dds_entity_t writer = writers_[static_cast<std::size_t>(topic)];
@@ -236,20 +218,43 @@ Result<dds_entity_t> DdsEngine::directed_writer(const Sender& receiver, Topic to
 }
 
 Status DdsEngine::write_to(const Sender& receiver, Topic topic, const void* sample) {
-  constexpr auto k_pause = std::chrono::milliseconds(2);
   LIMN_TRY(const dds_entity_t writer, directed_writer(receiver, topic));
-  dds_publication_matched_status_t matched{};
-  for (const Stamp end = now() + k_longest_match; matched.current_count == 0 && now() < end;) {
-    if (dds_get_publication_matched_status(writer, &matched) < 0) break;
-    if (matched.current_count == 0) std::this_thread::sleep_for(k_pause);
-  }
-  const dds_return_t code = matched.current_count > 0 ? dds_write(writer, sample) : DDS_RETCODE_TIMEOUT;
+  dds_return_t code = begin_directed(receiver, topic, writer, sample);
+  if (code == DDS_RETCODE_OK) code = dds_write(writer, sample);
   if (code == DDS_RETCODE_OK) return {};
   return error(
-      "machine '{}': expected it to accept a message within 2 s, found: {}. Check its network, or restart "
-      "limn node on "
-      "it.",
+      "machine '{}': expected it to accept a message within some seconds, found: {}. Check its network, or "
+      "restart Limn on it.",
       receiver.node, dds_strretcode(code));
+}
+
+// Before the first sample, waits until the receiver has confirmed something that means nothing to it. Until
+// then it may not know this writer, and what it misses comes out of order.
+dds_return_t DdsEngine::begin_directed(const Sender& receiver,
+                                       Topic topic,
+                                       dds_entity_t writer,
+                                       const void* sample) {
+  constexpr auto k_pause = std::chrono::milliseconds(2);
+  {
+    const std::lock_guard lock(directed_mutex_);
+    if (const auto found = directed_.find({receiver, topic});
+        found != directed_.end() && found->second.is_confirmed)
+      return DDS_RETCODE_OK;
+  }
+  const Stamp end = now() + k_longest_match;
+  dds_publication_matched_status_t matched{};
+  for (; matched.current_count == 0; std::this_thread::sleep_for(k_pause)) {
+    const dds_return_t code = dds_get_publication_matched_status(writer, &matched);
+    if (code < 0 || now() >= end) return code < 0 ? code : DDS_RETCODE_TIMEOUT;
+  }
+  dds_return_t code = dds_dispose(writer, sample);
+  if (code == DDS_RETCODE_OK)
+    code = dds_wait_for_acks(writer, std::max<dds_duration_t>(0, (end - now()).count()));
+  const std::lock_guard lock(directed_mutex_);
+  if (const auto found = directed_.find({receiver, topic});
+      code == DDS_RETCODE_OK && found != directed_.end())
+    found->second.is_confirmed = true;
+  return code;
 }
 
 void DdsEngine::connect(const Sender& receiver) {

@@ -6,6 +6,7 @@
 //   flood    sends 10 000 datagrams a second to the ports of the room's domain: what it has received from the
 //   room, as it
 //            was and with changed bytes, and random bytes; prints how many it has sent and received
+//   crowd    as flood, but each datagram announces another participant that claims to have keys
 
 #include <arpa/inet.h>
 #include <dds/dds.h>
@@ -106,43 +107,89 @@ int listening(int port) {
   return handle;
 }
 
-int flood(const std::string& room, double seconds) {
-  constexpr double k_per_second = 10000;
-  std::mt19937_64 random(1);
-  const int base = 7400 + 250 * nodes::room_domain(room);
-  const std::array<int, 2> inputs = {listening(base), listening(base + 1)};
-  const int output = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  const sockaddr_in self = address_of("127.0.0.1", 0);
-  ::setsockopt(output, IPPROTO_IP, IP_MULTICAST_IF, &self.sin_addr, sizeof self.sin_addr);
-  std::vector<sockaddr_in> targets = {address_of("239.255.0.1", base), address_of("239.255.0.1", base + 1)};
-  for (int i = 10; i < 16; ++i) targets.push_back(address_of("127.0.0.1", base + i));
-  std::vector<std::string> known;
-  std::array<char, 65536> buffer{};
-  long sent = 0;
-  std::size_t received = 0;
-  for (const Stamp begin = now(); seconds_between(begin, now()) < seconds;) {
-    for (const int input : inputs)
-      for (ssize_t length = 0; (length = ::recv(input, buffer.data(), buffer.size(), 0)) > 0;) {
-        ++received;
-        if (known.size() < 1000)
-          known.emplace_back(buffer.data(), static_cast<std::size_t>(length));
-        else
-          known[random() % known.size()].assign(buffer.data(), static_cast<std::size_t>(length));
-      }
-    for (; static_cast<double>(sent) < k_per_second * seconds_between(begin, now()); ++sent) {
-      std::string bytes = known.empty() || sent % 3 == 2 ? "RTPS\x02\x05" + std::string(200, '\0')
-                                                         : known[random() % known.size()];
-      if (sent % 3 == 1) bytes[20 + random() % (bytes.size() - 20)] ^= static_cast<char>(1 + random() % 255);
-      if (sent % 3 == 2)
-        for (std::size_t i = 6; i < bytes.size(); ++i) bytes[i] = static_cast<char>(random());
-      const sockaddr_in& to = targets[random() % targets.size()];
-      ::sendto(output, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
-    }
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+// Sends datagrams to all ports of a room.
+class Disturbance {
+ public:
+  Disturbance(const std::string& room, bool is_crowd)
+      : is_crowd_(is_crowd),
+        base_(7400 + 250 * nodes::room_domain(room)),
+        inputs_{listening(base_), listening(base_ + 1)} {
+    const sockaddr_in self = address_of("127.0.0.1", 0);
+    ::setsockopt(output_, IPPROTO_IP, IP_MULTICAST_IF, &self.sin_addr, sizeof self.sin_addr);
+    targets_ = {address_of("239.255.0.1", base_), address_of("239.255.0.1", base_ + 1)};
+    for (int i = 10; i < 16; ++i) targets_.push_back(address_of("127.0.0.1", base_ + i));
   }
-  std::printf("%ld sent, %zu received\n", sent, received);
-  return 0;
-}
+
+  void run(double seconds) {
+    constexpr double k_per_second = 10000;
+    for (const Stamp begin = now(); seconds_between(begin, now()) < seconds;) {
+      for (const int input : inputs_) receive_from(input);
+      while (static_cast<double>(sent_) < k_per_second * seconds_between(begin, now())) send_one();
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    std::printf("%ld sent, %zu received\n", sent_, received_);
+  }
+
+ private:
+  void receive_from(int input) {
+    constexpr std::size_t k_most = 1000;
+    static std::array<char, 65536> buffer;
+    for (ssize_t length = 0; (length = ::recv(input, buffer.data(), buffer.size(), 0)) > 0;) {
+      ++received_;
+      const std::string bytes(buffer.data(), static_cast<std::size_t>(length));
+      if (is_crowd_ && !is_announcement(bytes)) continue;
+      if (known_.size() < k_most)
+        known_.push_back(bytes);
+      else
+        known_[random_() % k_most] = bytes;
+    }
+  }
+
+  // Whether a datagram announces a participant: the only one that is not encrypted and names its room.
+  static bool is_announcement(const std::string& bytes) {
+    return bytes.size() > 40 && bytes.starts_with("RTPS") && bytes.find("limn ") != std::string::npos;
+  }
+
+  void send_one() {
+    std::string bytes = is_crowd_ ? of_another_participant() : disturbing();
+    const sockaddr_in& to = targets_[random_() % (is_crowd_ ? 1 : targets_.size())];
+    ::sendto(output_, bytes.data(), bytes.size(), 0, reinterpret_cast<const sockaddr*>(&to), sizeof to);
+    ++sent_;
+  }
+
+  std::string disturbing() {
+    if (known_.empty() || sent_ % 3 == 2) {
+      std::string bytes = "RTPS\x02\x05" + std::string(200, '\0');
+      for (std::size_t i = 6; i < bytes.size(); ++i) bytes[i] = static_cast<char>(random_());
+      return bytes;
+    }
+    std::string bytes = known_[random_() % known_.size()];
+    if (sent_ % 3 == 1) bytes[20 + random_() % (bytes.size() - 20)] ^= static_cast<char>(1 + random_() % 255);
+    return bytes;
+  }
+
+  std::string of_another_participant() {
+    constexpr std::size_t k_prefix = 12, k_at = 8;  // of a GUID; where the header has it
+    if (known_.empty()) return "RTPS";
+    std::string bytes = known_[random_() % known_.size()];
+    const std::string before = bytes.substr(k_at, k_prefix);
+    std::string after = before;
+    for (char& byte : after) byte = static_cast<char>(random_());
+    for (std::size_t at = 0; (at = bytes.find(before, at)) != std::string::npos; at += k_prefix)
+      bytes.replace(at, k_prefix, after);
+    return bytes;
+  }
+
+  const bool is_crowd_;
+  const int base_;
+  std::mt19937_64 random_{1};
+  std::array<int, 2> inputs_;
+  int output_ = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  std::vector<sockaddr_in> targets_;
+  std::vector<std::string> known_;
+  long sent_ = 0;
+  std::size_t received_ = 0;
+};
 
 }  // namespace
 }  // namespace limn
@@ -150,6 +197,8 @@ int flood(const std::string& room, double seconds) {
 int main(int count, char** words) {
   if (count != 4) return 2;
   const std::string what = words[2];
-  return what == "visit" ? limn::visit(words[1], std::atof(words[3]))
-                         : limn::flood(words[1], std::atof(words[3]));
+  const double seconds = std::atof(words[3]);
+  if (what == "visit") return limn::visit(words[1], seconds);
+  limn::Disturbance(words[1], what == "crowd").run(seconds);
+  return 0;
 }
