@@ -12,7 +12,7 @@ namespace limn::device {
 struct CameraConfig {
   std::string name = "camera0";
   std::string host = {};       ///< The machine of the room that it is plugged into; empty: this one.
-  std::string source = {};          ///< See open_camera().
+  std::string source = {};     ///< See open_camera().
   SensorSettings sensor = {};  ///< Exposure, gain, white balance (V4L2, GigE only).
   cv::Size size = {};          ///< Size of the frames (V4L2 and GigE set it); another size is an error.
   bool grey = false;           ///< Grey frames only, which is faster.

@@ -57,11 +57,10 @@ std::optional<std::pair<std::string, std::string>> swapped_cameras(
   return std::nullopt;
 }
 
-std::optional<std::string> SwappedCamerasCheck::check(
-    const Rig& rig,
-    std::span<const Body> bodies,
-    std::span<const std::vector<Detection>> detections,
-    Stamp captured_at) {
+std::optional<std::string> SwappedCamerasCheck::check(const Rig& rig,
+                                                      std::span<const Body> bodies,
+                                                      std::span<const std::vector<Detection>> detections,
+                                                      Stamp captured_at) {
   if (has_warned_ || rig.cameras.size() < 2 ||
       seconds_between(compared_at_, captured_at) < k_compare_cameras_every_s)
     return std::nullopt;

@@ -30,7 +30,7 @@ class Neighbourhood {
   dds_entity_t participants_ = 0, offers_ = 0;
   dds_instance_handle_t self_ = 0;
   std::mutex mutex_;
-  std::map<dds_instance_handle_t, Stamp> met_;      // when each connected writer of offers wrote last
+  std::map<dds_instance_handle_t, Stamp> met_;        // when each connected writer of offers wrote last
   std::map<dds_instance_handle_t, Stamp> strangers_;  // participants that are not connected, since when
 };
 
