@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <opencv2/core.hpp>
 
 namespace limn::session {
 namespace {
