@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "gui/qr_code.h"
+#include "device/gui/qr_code.h"
 
 namespace limn::remote {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "core/log.h"
 #include "core/names.h"
-#include "gui/qr_code.h"
+#include "device/gui/qr_code.h"
 #include "tracker/camera_encoding.h"
 
 namespace limn::session {

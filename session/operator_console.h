@@ -7,7 +7,7 @@
 
 #include "core/result.h"
 #include "device/desktop.h"
-#include "gui/gui_window.h"
+#include "device/gui/gui_window.h"
 #include "session/device_health.h"
 #include "session/keys.h"
 #include "session/operator_panel.h"

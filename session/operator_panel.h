@@ -3,7 +3,7 @@
 #include <array>
 #include <string>
 
-#include "gui/gui.h"
+#include "device/gui/gui.h"
 #include "session/operator_view.h"
 
 namespace limn::session {

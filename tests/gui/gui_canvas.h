@@ -11,7 +11,7 @@
 
 #include "core/image_io.h"
 #include "device/gl_context.h"
-#include "gui/gui.h"
+#include "device/gui/gui.h"
 
 namespace limn::test {
 

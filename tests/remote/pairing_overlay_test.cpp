@@ -9,7 +9,7 @@
 
 #include "core/image_io.h"
 #include "device/gl_context.h"
-#include "gui/qr_code.h"
+#include "device/gui/qr_code.h"
 #include "session/perception.h"
 #include "session/session.h"
 #include "sim/virtual_rig.h"

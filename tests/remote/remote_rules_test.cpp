@@ -8,8 +8,8 @@
 #include <set>
 
 #include "core/file.h"
+#include "device/gui/qr_code.h"
 #include "device/udp_socket.h"
-#include "gui/qr_code.h"
 #include "remote/api/auth_sessions.h"
 #include "remote/api/guest_name.h"
 #include "remote/api/messages.h"

@@ -8,7 +8,7 @@
 
 #include "apps/live.h"
 #include "core/file.h"
-#include "gui/qr_code.h"
+#include "device/gui/qr_code.h"
 #include "session/operator_console.h"
 #include "session/operator_panel.h"
 #include "sim/virtual_rig.h"

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "calib/board/board.h"
-#include "gui/gui.h"
+#include "device/gui/gui.h"
 
 namespace limn::wizard {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "gui/gui.h"
+#include "device/gui/gui.h"
 #include "wizard/capture/request.h"
 #include "wizard/window/board_size_input.h"
 #include "wizard/window/wizard_view.h"

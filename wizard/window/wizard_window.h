@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "gui/gui_window.h"
+#include "device/gui/gui_window.h"
 #include "wizard/capture/backend.h"
 #include "wizard/capture/main_thread_executor.h"
 #include "wizard/sequence.h"

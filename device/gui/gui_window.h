@@ -8,8 +8,8 @@
 
 #include "core/result.h"
 #include "device/desktop.h"
+#include "device/gui/gui.h"
 #include "device/window.h"
-#include "gui/gui.h"
 
 namespace limn::gui {
 

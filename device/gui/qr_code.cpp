@@ -1,4 +1,4 @@
-#include "gui/qr_code.h"
+#include "device/gui/qr_code.h"
 
 #include <qrencode.h>
 

@@ -1,4 +1,4 @@
-#include "gui/gui_window.h"
+#include "device/gui/gui_window.h"
 
 #include <algorithm>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "gui/gui.h"
+#include "device/gui/gui.h"
 
 #include <backends/imgui_impl_opengl3.h>
 #include <epoxy/gl.h>
