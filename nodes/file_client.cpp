@@ -4,7 +4,6 @@
 #include <openssl/ssl.h>
 
 #include <algorithm>
-#include <array>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ssl/context.hpp>
@@ -19,6 +18,7 @@
 #include "device/udp_socket.h"
 #include "nodes/file_listing.h"
 #include "remote/http/http.h"
+#include "remote/http/x509.h"
 
 namespace limn::nodes {
 namespace {
@@ -61,13 +61,8 @@ std::vector<tcp::endpoint> endpoints_of(const std::string& server) {
 }
 
 std::string certificate_of_peer(SSL* session) {
-  const std::unique_ptr<X509, decltype(&X509_free)> shown(SSL_get1_peer_certificate(session), X509_free);
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned length = 0;
-  if (!shown || X509_digest(shown.get(), EVP_sha256(), digest.data(), &length) != 1) return "";
-  std::string text;
-  for (std::size_t i = 0; i < length; ++i) text += fmt::format("{}{:02X}", i > 0 ? ":" : "", digest[i]);
-  return text;
+  const remote::X509Certificate shown(SSL_get1_peer_certificate(session));
+  return shown ? remote::fingerprint_of(shown.get()) : std::string();
 }
 
 std::string text_of_problem(const Problem& problem) {

@@ -1,27 +1,22 @@
 #include "remote/http/certificate.h"
 
 #include <arpa/inet.h>
-#include <openssl/bio.h>
-#include <openssl/ec.h>
 #include <openssl/err.h>
-#include <openssl/evp.h>
-#include <openssl/pem.h>
-#include <openssl/rand.h>
-#include <openssl/x509.h>
 #include <openssl/x509v3.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <memory>
 #include <optional>
 
 #include "core/file.h"
 #include "device/udp_socket.h"
 #include "remote/http/own_addresses.h"
+#include "remote/http/x509.h"
 
 namespace limn::remote {
 namespace {
@@ -39,23 +34,7 @@ constexpr const char* k_permitted =
     "permitted;IP:fc00::/fe00::,permitted;IP:fe80::/ffc0::,"
     "permitted;IP:::1/ffff:ffff:ffff:ffff:ffff:ffff:ffff:ffff";
 
-template <auto free>
-struct Free {
-  template <class T>
-  void operator()(T* object) const {
-    free(object);
-  }
-};
-using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
-using X509Certificate = std::unique_ptr<X509, Free<X509_free>>;
-using Bio = std::unique_ptr<BIO, Free<BIO_free>>;
-using Extension = std::unique_ptr<X509_EXTENSION, Free<X509_EXTENSION_free>>;
-using NameConstraints = std::unique_ptr<NAME_CONSTRAINTS, Free<NAME_CONSTRAINTS_free>>;
-
-struct Pair {
-  Key key;
-  X509Certificate certificate;
-};
+using NameConstraints = std::unique_ptr<NAME_CONSTRAINTS, FreeOpenSsl<NAME_CONSTRAINTS_free>>;
 
 bool is_for(X509* certificate, const std::string& host) {
   return device::numeric_address(host)
@@ -72,23 +51,6 @@ bool is_for_all(X509* certificate, const std::vector<std::string>& hosts) {
 bool ends_within(long days, X509* certificate) {
   std::time_t then = std::time(nullptr) + days * k_day_s;
   return X509_cmp_time(X509_get0_notAfter(certificate), &then) <= 0;
-}
-
-std::string fingerprint_of(X509* certificate) {
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned length = 0;
-  LIMN_CHECK(X509_digest(certificate, EVP_sha256(), digest.data(), &length) == 1);
-  std::string text;
-  for (std::size_t i = 0; i < length; ++i) text += fmt::format("{}{:02X}", i > 0 ? ":" : "", digest[i]);
-  return text;
-}
-
-void add_extension(X509* certificate, X509* issuer, int kind, const std::string& value) {
-  X509V3_CTX context;
-  X509V3_set_ctx_nodb(&context);
-  X509V3_set_ctx(&context, issuer, certificate, nullptr, nullptr, 0);
-  const Extension extension(X509V3_EXT_conf_nid(nullptr, &context, kind, value.c_str()));
-  LIMN_CHECK(extension && X509_add_ext(certificate, extension.get(), -1) == 1);
 }
 
 std::string alternative_names(const std::vector<std::string>& hosts) {
@@ -111,34 +73,16 @@ std::string permitted_names(const std::vector<std::string>& hosts) {
   return names;
 }
 
-// A key and its certificate, without extensions, not yet signed.
-Pair unsigned_pair(const std::string& name, int days) {
-  Pair out{Key(EVP_EC_gen("P-256")), X509Certificate(X509_new())};
-  X509* certificate = out.certificate.get();
-  std::array<unsigned char, 16> serial{};
-  LIMN_CHECK(out.key && certificate && RAND_bytes(serial.data(), static_cast<int>(serial.size())) == 1);
-  serial[0] &= 0x7f;
-  const std::unique_ptr<BIGNUM, Free<BN_free>> number(
-      BN_bin2bn(serial.data(), static_cast<int>(serial.size()), nullptr));
-  LIMN_CHECK(number && BN_to_ASN1_INTEGER(number.get(), X509_get_serialNumber(certificate)));
-  X509_set_version(certificate, X509_VERSION_3);
-  X509_gmtime_adj(X509_getm_notBefore(certificate), -k_day_s);  // for phones whose clocks are slow
-  X509_gmtime_adj(X509_getm_notAfter(certificate), days * k_day_s);
-  X509_NAME_add_entry_by_txt(X509_get_subject_name(certificate), "CN", MBSTRING_UTF8,
-                             reinterpret_cast<const unsigned char*>(name.c_str()), -1, -1, 0);
-  X509_set_pubkey(certificate, out.key.get());
-  return out;
+KeyPair named_pair(const std::string& name, int days) {
+  const std::pair<const char*, std::string> subject{"CN", name};
+  const std::time_t now = std::time(nullptr);
+  return unsigned_pair({&subject, 1}, now - k_day_s, now + days * k_day_s);  // phones' clocks may be slow
 }
 
-void sign(const Pair& authority, X509* certificate) {
-  X509_set_issuer_name(certificate, X509_get_subject_name(authority.certificate.get()));
-  LIMN_CHECK(X509_sign(certificate, authority.key.get(), EVP_sha256()) > 0);
-}
-
-Pair make_authority(const std::vector<std::string>& hosts) {
+KeyPair make_authority(const std::vector<std::string>& hosts) {
   constexpr std::size_t k_most = 40;  // letters of the machine's name; a certificate's name has 64 at most
   const std::string machine = own_host_name().substr(0, k_most);
-  Pair out = unsigned_pair(machine.empty() ? "Limn" : "Limn on " + machine, k_authority_days);
+  KeyPair out = named_pair(machine.empty() ? "Limn" : "Limn on " + machine, k_authority_days);
   X509* certificate = out.certificate.get();
   add_extension(certificate, certificate, NID_basic_constraints, "critical,CA:TRUE,pathlen:0");
   add_extension(certificate, certificate, NID_key_usage, "critical,keyCertSign");
@@ -148,8 +92,8 @@ Pair make_authority(const std::vector<std::string>& hosts) {
   return out;
 }
 
-Pair make_server_pair(const Pair& authority, const std::vector<std::string>& hosts) {
-  Pair out = unsigned_pair("Limn", k_certificate_days);
+KeyPair make_server_pair(const KeyPair& authority, const std::vector<std::string>& hosts) {
+  KeyPair out = named_pair("Limn", k_certificate_days);
   X509 *certificate = out.certificate.get(), *issuer = authority.certificate.get();
   add_extension(certificate, issuer, NID_subject_alt_name, alternative_names(hosts));
   add_extension(certificate, issuer, NID_basic_constraints, "critical,CA:FALSE");
@@ -160,28 +104,17 @@ Pair make_server_pair(const Pair& authority, const std::vector<std::string>& hos
   return out;
 }
 
-bool is_signed_by(const Pair& authority, X509* certificate) {
+bool is_signed_by(const KeyPair& authority, X509* certificate) {
   const bool is_so = X509_verify(certificate, authority.key.get()) == 1;
   ERR_clear_error();
   return is_so;
 }
 
-bool may_sign(const Pair& authority, X509* certificate) {
+bool may_sign(const KeyPair& authority, X509* certificate) {
   const NameConstraints permitted(static_cast<NAME_CONSTRAINTS*>(
       X509_get_ext_d2i(authority.certificate.get(), NID_name_constraints, nullptr, nullptr)));
   X509_check_purpose(certificate, -1, 0);  // parses the names, which the next check needs
   return permitted && NAME_CONSTRAINTS_check(certificate, permitted.get()) == X509_V_OK;
-}
-
-std::string pem_of(const Pair& pair, X509* authority = nullptr) {
-  const Bio memory(BIO_new(BIO_s_mem()));
-  LIMN_CHECK(memory &&
-             PEM_write_bio_PrivateKey(memory.get(), pair.key.get(), nullptr, nullptr, 0, nullptr, nullptr) &&
-             PEM_write_bio_X509(memory.get(), pair.certificate.get()) &&
-             (!authority || PEM_write_bio_X509(memory.get(), authority)));
-  char* text = nullptr;
-  const long length = BIO_get_mem_data(memory.get(), &text);
-  return std::string(text, text + length);
 }
 
 std::string der_of(X509* certificate) {
@@ -230,14 +163,12 @@ Status check_is_secret(const fs::path& path) {
 }
 
 // The key and the certificate of a file; nullopt: there is none.
-Result<std::optional<Pair>> read_pair(const fs::path& path) {
+Result<std::optional<KeyPair>> read_pair(const fs::path& path) {
   LIMN_TRY_STATUS(check_is_secret(path));
   std::error_code ignored;
-  if (!fs::exists(path, ignored)) return std::optional<Pair>();
+  if (!fs::exists(path, ignored)) return std::optional<KeyPair>();
   LIMN_TRY(const std::string pem, read_file(path));
-  const auto opened = [&] { return Bio(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size()))); };
-  Pair found{Key(PEM_read_bio_PrivateKey(opened().get(), nullptr, nullptr, nullptr)),
-             X509Certificate(PEM_read_bio_X509(opened().get(), nullptr, nullptr, nullptr))};
+  KeyPair found{key_in(pem), certificate_in(pem)};
   const bool is_pair =
       found.key && found.certificate && X509_check_private_key(found.certificate.get(), found.key.get()) == 1;
   ERR_clear_error();
@@ -249,23 +180,24 @@ Result<std::optional<Pair>> read_pair(const fs::path& path) {
   return std::optional(std::move(found));
 }
 
-Certificate certificate_of(const Pair& own, const Pair& authority) {
+Certificate certificate_of(const KeyPair& own, const KeyPair& authority) {
   X509* signer = authority.certificate.get();
-  return {pem_of(own, signer), fingerprint_of(own.certificate.get()), der_of(signer), fingerprint_of(signer)};
+  return {pem_of(own) + pem_of(signer), fingerprint_of(own.certificate.get()), der_of(signer),
+          fingerprint_of(signer)};
 }
 
 }  // namespace
 
 Certificate make_certificate(const std::vector<std::string>& hosts) {
-  const Pair authority = make_authority(hosts);
+  const KeyPair authority = make_authority(hosts);
   return certificate_of(make_server_pair(authority, hosts), authority);
 }
 
 Result<Certificate> load_or_create_certificate(const fs::path& folder,
                                                const std::vector<std::string>& hosts) {
   LIMN_TRY_STATUS(make_folder(folder));
-  LIMN_TRY(std::optional<Pair> authority, read_pair(folder / k_authority_file));
-  LIMN_TRY(std::optional<Pair> own, read_pair(folder / k_file));
+  LIMN_TRY(std::optional<KeyPair> authority, read_pair(folder / k_authority_file));
+  LIMN_TRY(std::optional<KeyPair> own, read_pair(folder / k_file));
   if (authority && ends_within(k_certificate_days, authority->certificate.get())) authority.reset();
   const bool is_known = authority && own && is_signed_by(*authority, own->certificate.get()) &&
                         is_for_all(own->certificate.get(), hosts) &&
