@@ -485,6 +485,13 @@ void add_room_options(CLI::App* command, RoomOptions* options) {
                       "Network interface to use; may be repeated; without it all that work");
 }
 
+void add_room_of_devices(CLI::App* command, RoomOptions* options) {
+  command->add_option(
+      "--room", options->room,
+      "Name or folder of a room: devices with host in the devices file are at its other machines");
+  add_room_options(command, options);
+}
+
 void add_calibrate(CLI::App& app, Run& run) {
   auto* command = app.add_subcommand(
       "calibrate",
@@ -517,10 +524,7 @@ void add_calibrate(CLI::App& app, Run& run) {
           "--scene", options->scene,
           "Scene whose CAD mesh is aligned to the scan; with --plan the default is the scene of its world")
       ->check(CLI::ExistingPath);
-  command->add_option(
-      "--room", options->room.room,
-      "Name or folder of a room: devices with host in the devices file are at its other machines");
-  add_room_options(command, &options->room);
+  add_room_of_devices(command, &options->room);
   add_board_measured(command, &options->board_measured);
   command->add_option("--out", options->out, "Rig folder to write; it also keeps the captures")->required();
   command->add_flag("!--no-scan", options->scan, "Stop after the rig and do not scan the prototype");
@@ -911,10 +915,7 @@ void add_live(CLI::App& app, Run& run) {
       "--poses-out", options->poses_out,
       "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
       "freed or json; or ros for ROS 2; may be repeated");
-  command->add_option(
-      "--room", options->room.room,
-      "Name or folder of a room: devices with host in the devices file are at its other machines");
-  add_room_options(command, &options->room);
+  add_room_of_devices(command, &options->room);
   command->add_option("--serve", options->serve,
                       "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
                       "machine only, a network address is encrypted");

@@ -21,7 +21,7 @@ class WireFilling {
  private:
   template <class Wire>
   std::shared_ptr<Wire> begun(const Sender& from) {
-    const auto wire = std::make_shared<Wire>();
+    auto wire = std::make_shared<Wire>();
     text(from.node, &wire->node);
     wire->run = from.run;
     return wire;

@@ -15,6 +15,7 @@
 #include "nodes/dds/domain_config.h"
 #include "nodes/dds/neighbourhood.h"
 #include "nodes/dds/qualities.h"
+#include "nodes/dds/samples.h"
 #include "nodes/engine.h"
 
 namespace limn::nodes {
@@ -169,18 +170,11 @@ void DdsEngine::take_waiting() {
 }
 
 void DdsEngine::take_samples(Topic topic, dds_entity_t reader) {
-  constexpr std::size_t k_batch = 8;
   const Stamp arrived_at = now();
-  for (int count = static_cast<int>(k_batch); count == static_cast<int>(k_batch);) {
-    std::array<void*, k_batch> samples{};
-    std::array<dds_sample_info_t, k_batch> infos{};
-    count = dds_take(reader, samples.data(), infos.data(), k_batch, k_batch);
-    for (std::size_t i = 0; static_cast<int>(i) < count; ++i) {
-      if (infos[i].valid_data) events_->receive_sample(topic, samples[i], arrived_at);
-      if (topic == Topic::offer) report_presence(*static_cast<const limn_v1_Offer*>(samples[i]), infos[i]);
-    }
-    if (count > 0) dds_return_loan(reader, samples.data(), count);
-  }
+  take_all(reader, [&](const void* sample, const dds_sample_info_t& info) {
+    if (info.valid_data) events_->receive_sample(topic, sample, arrived_at);
+    if (topic == Topic::offer) report_presence(*static_cast<const limn_v1_Offer*>(sample), info);
+  });
 }
 
 void DdsEngine::report_presence(const limn_v1_Offer& offer, const dds_sample_info_t& info) {

@@ -3,7 +3,6 @@
 #include <dds/dds.h>
 #include <fmt/format.h>
 
-#include <array>
 #include <cstdlib>
 #include <deque>
 #include <map>
@@ -12,6 +11,7 @@
 
 #include "exchange/poses/pose_limits.h"
 #include "nodes/dds/qualities.h"
+#include "nodes/dds/samples.h"
 #include "nodes/ros_port.h"
 #include "ros_poses.h"
 
@@ -181,28 +181,21 @@ Result<std::size_t> DdsRosPort::subscribe(const std::string& topic) {
 }
 
 void DdsRosPort::notice_data(dds_entity_t reader, void* argument) {
-  constexpr std::size_t k_batch = 8;
   auto* subscription = static_cast<Subscription*>(argument);
   const Stamp arrived_at = now();
-  for (int count = static_cast<int>(k_batch); count == static_cast<int>(k_batch);) {
-    std::array<void*, k_batch> samples{};
-    std::array<dds_sample_info_t, k_batch> infos{};
-    count = dds_take(reader, samples.data(), infos.data(), k_batch, k_batch);
-    for (std::size_t i = 0; static_cast<int>(i) < count; ++i) {
-      if (!infos[i].valid_data) continue;
-      RosMessage message{{}, arrived_at};
-      if (subscription->has_transforms) {
-        const auto& list = static_cast<const TransformMessage*>(samples[i])->transforms;
-        // One more than is accepted, so that longer messages are refused.
-        for (std::uint32_t k = 0; k < list._length && k <= exchange::k_most_poses; ++k)
-          message.poses.push_back(read_transform(list._buffer[k]));
-      } else {
-        message.poses.push_back(read_pose(*static_cast<const PoseStamped*>(samples[i]), subscription->topic));
-      }
-      keep(std::move(message), subscription);
+  take_all(reader, [&](const void* sample, const dds_sample_info_t& info) {
+    if (!info.valid_data) return;
+    RosMessage message{{}, arrived_at};
+    if (subscription->has_transforms) {
+      const auto& list = static_cast<const TransformMessage*>(sample)->transforms;
+      // One more than is accepted, so that longer messages are refused.
+      for (std::uint32_t k = 0; k < list._length && k <= exchange::k_most_poses; ++k)
+        message.poses.push_back(read_transform(list._buffer[k]));
+    } else {
+      message.poses.push_back(read_pose(*static_cast<const PoseStamped*>(sample), subscription->topic));
     }
-    if (count > 0) dds_return_loan(reader, samples.data(), count);
-  }
+    keep(std::move(message), subscription);
+  });
 }
 
 void DdsRosPort::keep(RosMessage message, Subscription* subscription) {

@@ -44,7 +44,7 @@ fs::path plugin_folder() {
   Dl_info info{};
   if (::dladdr(reinterpret_cast<void*>(&dds_create_participant), &info) == 0 || !info.dli_fname) return {};
   std::error_code ignored;
-  const fs::path folder = fs::weakly_canonical(info.dli_fname, ignored).parent_path();
+  fs::path folder = fs::weakly_canonical(info.dli_fname, ignored).parent_path();
   if (fs::exists(folder / k_plugin, ignored)) return folder;
   for (const auto& entry : fs::directory_iterator(folder, ignored)) {
     const std::string name = entry.path().filename().string();

@@ -273,30 +273,26 @@ def nobody_freezes_on_a_bad_network(machines):
 nobody_freezes_on_a_bad_network.network = LossyNetwork
 
 
-def machines_meet_without_multicast(machines):
-    """With the host's address as a peer of the nodes."""
+def meet(machines, extra=()):
     for node in NODES:
-        machines.start_node(node, extra=["--peer", f"{PREFIX}1"])
+        machines.start_node(node, extra=extra)
     machines.start_host(0)
     paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
-    print(f"images {wait_for(60, lambda: all(rows_in(path) > 5 for path in paths), 'the nodes show images'):.1f} s after "
-          "the start")
+    seconds = wait_for(60, lambda: all(rows_in(path) > 5 for path in paths), "the nodes show images")
+    print(f"images {seconds:.1f} s after the start")
     machines.end()
 
 
-machines_meet_without_multicast.network = NetworkWithoutMulticast
+def machines_meet_without_multicast(machines):
+    """With the host's address as a peer of the nodes."""
+    meet(machines, ["--peer", f"{PREFIX}1"])
 
 
 def machines_meet_by_ipv6(machines):
-    for node in NODES:
-        machines.start_node(node)
-    machines.start_host(0)
-    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
-    print(f"images {wait_for(60, lambda: all(rows_in(path) > 5 for path in paths), 'the nodes show images'):.1f} s after "
-          "the start")
-    machines.end()
+    meet(machines)
 
 
+machines_meet_without_multicast.network = NetworkWithoutMulticast
 machines_meet_by_ipv6.network = NetworkOfVersion6
 
 

@@ -68,11 +68,15 @@ TEST(RoomKeys, NothingIsOverwritten) {
   const std::string before = read_file(room.folder() / "host.pem").value();
   const Status again = create_room(room.folder(), room.name());
   ASSERT_FALSE(again);
-  EXPECT_TRUE(has(again.message(), room.folder().string())) << again.message();
+  EXPECT_TRUE(has(again.message(), room.folder().string() + ": expected a new folder")) << again.message();
   EXPECT_EQ(read_file(room.folder() / "host.pem").value(), before);
   const fs::path file = room.folder().parent_path() / "file";
   ASSERT_TRUE(write_file(file, "mine"));
   EXPECT_FALSE(create_room(file, "room"));
+  const fs::path empty = room.folder().parent_path() / "empty";  // which a rename would replace
+  fs::create_directory(empty);
+  EXPECT_FALSE(create_room(empty, "room"));
+  EXPECT_TRUE(fs::remove(empty));
   EXPECT_EQ(read_file(file).value(), "mine");
   for (const auto& entry : fs::directory_iterator(room.folder().parent_path()))
     EXPECT_TRUE(entry.path() == file || entry.path() == room.folder()) << entry.path() << " was left behind";

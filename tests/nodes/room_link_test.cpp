@@ -79,7 +79,7 @@ TEST(RoomLink, DeliversEveryMessageToTheBit) {
   const auto host = room.open_link("alpha", RoomRole::host);
   const Peer peer(room.folder(), "beta", "node", "replies", k_seed);
   ASSERT_TRUE(wait_for<Offer>(*host, "beta"));
-  for (const std::size_t kind : {0, 3, 4, 6, 7}) {  // those that a node may send
+  for (const std::size_t kind : {0u, 3u, 4u, 6u, 7u}) {  // those that a node may send
     for (std::uint64_t i = 0; i < 20; ++i) {
       const auto got = requested(*host, kind, i);
       ASSERT_TRUE(got) << "kind " << kind;
@@ -96,7 +96,7 @@ TEST(RoomLink, DeliversWhatAHostSendsToTheBit) {
   ASSERT_TRUE(node->send(Offer{}));
   const Peer host(room.folder(), "beta", "host", "all", k_seed);
   std::set<std::string> expected, got;
-  for (const std::size_t kind : {1, 2, 5})
+  for (const std::size_t kind : {1u, 2u, 5u})
     for (std::uint64_t i = 0; i < 20; ++i)
       expected.insert(test::to_text(test::random_message(kind, k_seed + i, "alpha")));
   wait_for(*node, [&](const Received& one) {

@@ -71,7 +71,7 @@ void send_all(RoomLink& link, std::uint64_t seed) {
     for (const Received& received : link.take_messages(std::chrono::milliseconds(10)))
       if (std::holds_alternative<Offer>(received.message)) node = received.from.node;
   for (std::uint64_t round = 0; !input_has_ended(); ++round)
-    for (const std::size_t kind : {1, 2, 5}) {
+    for (const std::size_t kind : {1u, 2u, 5u}) {
       send_or_warn(link, test::random_message(kind, seed + round % 20, node));
       std::this_thread::sleep_for(std::chrono::milliseconds(20));  // so that no newer one replaces it
     }

@@ -99,7 +99,7 @@ int listening(int port) {
   const int handle = ::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0), yes = 1;
   ::setsockopt(handle, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   const sockaddr_in at = address_of("0.0.0.0", port);
-  ::bind(handle, reinterpret_cast<const sockaddr*>(&at), sizeof at);
+  if (::bind(handle, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0) std::abort();
   ip_mreq group{};
   ::inet_pton(AF_INET, "239.255.0.1", &group.imr_multiaddr);
   ::inet_pton(AF_INET, "127.0.0.1", &group.imr_interface);
@@ -164,7 +164,7 @@ class Disturbance {
       return bytes;
     }
     std::string bytes = known_[random_() % known_.size()];
-    if (sent_ % 3 == 1) bytes[20 + random_() % (bytes.size() - 20)] ^= static_cast<char>(1 + random_() % 255);
+    if (sent_ % 3 == 1) bytes[20 + random_() % (bytes.size() - 20)] = static_cast<char>(random_());
     return bytes;
   }
 
