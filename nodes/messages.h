@@ -91,9 +91,7 @@ struct Order {
     open_display,
     show,  ///< shows `image`
     open_camera,
-    grab,  ///< answers the next image; with `at`, one that was exposed later
-    close_displays,
-    close_cameras
+    grab  ///< answers the next image; with `at`, one that was exposed later
   };
   std::string to = {};
   std::uint64_t number = 0;

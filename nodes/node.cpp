@@ -58,7 +58,7 @@ class NodeLoop {
   }
 
   void end() {
-    if (frames_) frames_->dim(0);
+    displays_.darken();
     log_.flush();
   }
 
@@ -80,6 +80,7 @@ class NodeLoop {
       setup_.reset();
       log_warning("node: the host {} has gone; the light fades out until it is back", host_->sender.node);
       gone_at_ = now();
+      cameras_.close_cameras();
     }
     host_ = host;
   }
@@ -149,6 +150,7 @@ class NodeLoop {
     if (frames_) frames_->dim(share);
     if (share > 0) return;
     gone_at_.reset();
+    displays_.darken();
     log_info("node: the light is out");
   }
 

@@ -1,5 +1,8 @@
 #include "nodes/node_devices.h"
 
+#include <opencv2/core.hpp>
+
+#include "core/log.h"
 #include "device/devices_file.h"
 #include "device/gige_camera.h"
 #include "device/v4l2_camera.h"
@@ -28,6 +31,14 @@ Result<device::Display*> NodeDisplays::display(const device::DisplayConfig& conf
     LIMN_TRY(display, device::open_display(config, desktop_));
   }
   return display.get();
+}
+
+void NodeDisplays::darken() {
+  for (const auto& [config, display] : displays_) {
+    if (!display) continue;
+    const auto shown_at = display->show(cv::Mat(display->size(), CV_8UC3, cv::Scalar::all(0)));
+    if (!shown_at) log_warning("node: {}", shown_at.message());
+  }
 }
 
 Result<device::CameraSource*> NodeCameras::camera(const device::CameraConfig& config) {

@@ -25,7 +25,8 @@ class NodeDisplays {
   std::vector<OfferedDevice> monitors() const;
   /// The display of that configuration. Errors are those of device::open_display.
   Result<device::Display*> display(const device::DisplayConfig& config);
-  void close_all() { displays_.clear(); }
+  /// Shows black on all displays. They stay open, because behind a projector's window is the bright desktop.
+  void darken();
 
  private:
   const device::Desktop* desktop_;

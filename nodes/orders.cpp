@@ -91,7 +91,7 @@ Answer answer_to(const Order& order, const std::function<Status(Answer*)>& carry
 
 bool is_for_camera(const Order& order) {
   using enum Order::What;
-  return order.what == open_camera || order.what == grab || order.what == close_cameras;
+  return order.what == open_camera || order.what == grab;
 }
 
 Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeDisplays* displays) {
@@ -99,9 +99,7 @@ Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock
     if (order.what == Order::What::open_display) return open_display(order, displays, answer);
     if (order.what == Order::What::show)
       return clock ? show(order, *clock, displays, answer) : Status(no_clock());
-    if (order.what != Order::What::close_displays) return unknown(order);
-    displays->close_all();
-    return {};
+    return unknown(order);
   });
 }
 
@@ -110,9 +108,7 @@ Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock
     if (order.what == Order::What::open_camera) return open_camera(order, cameras, answer);
     if (order.what == Order::What::grab)
       return clock ? grab(order, *clock, cameras, answer) : Status(no_clock());
-    if (order.what != Order::What::close_cameras) return unknown(order);
-    cameras->close_all();
-    return {};
+    return unknown(order);
   });
 }
 
@@ -133,11 +129,22 @@ void CameraWorker::carry_out(Order order, const std::string& host) {
   changed_.notify_all();
 }
 
+void CameraWorker::close_cameras() {
+  {
+    const std::lock_guard lock(mutex_);
+    orders_.clear();
+    is_closing_ = true;
+  }
+  changed_.notify_all();
+}
+
 void CameraWorker::run() {
   while (true) {
     std::unique_lock lock(mutex_);
-    changed_.wait(lock, [&] { return is_stopping_ || !orders_.empty(); });
+    changed_.wait(lock, [&] { return is_stopping_ || is_closing_ || !orders_.empty(); });
     if (is_stopping_) return;
+    if (std::exchange(is_closing_, false)) cameras_.close_all();
+    if (orders_.empty()) continue;
     const auto [order, host] = std::move(orders_.front());
     orders_.pop_front();
     lock.unlock();

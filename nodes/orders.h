@@ -30,6 +30,8 @@ class CameraWorker {
 
   /// Queues an order; its answer is sent to the room.
   void carry_out(Order order, const std::string& host);
+  /// Drops the orders that wait, and closes all cameras, so that other programs can use them.
+  void close_cameras();
 
  private:
   void run();
@@ -39,7 +41,7 @@ class CameraWorker {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<std::pair<Order, std::string>> orders_;
-  bool is_stopping_ = false;
+  bool is_stopping_ = false, is_closing_ = false;
   std::thread thread_;
 };
 

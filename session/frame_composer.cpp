@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "core/names.h"
 #include "projector/overlays/marker_signs.h"
@@ -106,7 +107,6 @@ const ComposedFrame& FrameComposer::compose(const FrameInput& input) {
 }
 
 const FrameDescription& FrameComposer::describe(const FrameInput& input) {
-  ++frame_.number;
   frame_.painted_at = composed_.painted_at = input.times.now;
   frame_.shown_at = composed_.shown_at = input.times.shown_at;
   const scene::ShowState& show_state = input.show_state;
@@ -114,8 +114,9 @@ const FrameDescription& FrameComposer::describe(const FrameInput& input) {
   if (is_held_) return frame_;
 
   // Poses of the parts, fades, viewpoint, shadows on the prototype.
-  FrameDescription before = std::move(frame_);
-  frame_ = {.number = before.number, .painted_at = before.painted_at, .shown_at = before.shown_at};
+  const FrameDescription before = std::exchange(frame_, {});
+  frame_.painted_at = input.times.now;
+  frame_.shown_at = input.times.shown_at;
   frame_.is_black = show_state.blackout;
   frame_.tracks = input.tracks;
   keep_still(fading_.faded().world_from_prototype, prototype_box_, &frame_.tracks);

@@ -29,7 +29,7 @@ struct FadingScene {
 /// Everything that a frame's projector images depend on besides scene, rig and DrawOptions. Equal
 /// descriptions give equal images, on every machine with the same OpenGL driver. World frame.
 struct FrameDescription {
-  std::uint64_t number = 0;  ///< counts the frames of a session
+  std::uint64_t number = 0;  ///< counts the frames that a host has sent to its nodes
   Stamp painted_at, shown_at;
   std::vector<Track> tracks = {};  ///< predicted to shown_at; of bodies and of loose markers
   scene::PosedScene posed = {};    ///< the scene posed by the tracks and the show state

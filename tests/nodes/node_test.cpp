@@ -13,6 +13,8 @@
 #include "core/image_io.h"
 #include "core/version.h"
 #include "device/gl_context.h"
+#include "device/offscreen_display.h"
+#include "nodes/node_devices.h"
 #include "nodes/node_frames.h"
 #include "nodes/remote_devices.h"
 #include "nodes/room_host.h"
@@ -209,6 +211,19 @@ TEST_F(NodeTest, ShowsAndGrabsForACalibration) {
   const auto no_camera = opener.camera({.name = "camera1", .host = "left", .source = "nothing"});
   ASSERT_FALSE(no_camera);
   EXPECT_NE(no_camera.message().find("left"), std::string::npos) << no_camera.message();
+}
+
+TEST(NodeDisplays, AreAllBlackWhenTheHostHasGone) {
+  NodeDisplays displays(nullptr);
+  std::vector<const device::OffscreenDisplay*> shown;
+  for (const char* name : {"projector0", "projector1"}) {
+    device::Display* display = displays.display(offscreen(name, "left", {64, 48})).value();
+    ASSERT_TRUE(display->show(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(200))));
+    shown.push_back(dynamic_cast<const device::OffscreenDisplay*>(display));
+  }
+  displays.darken();
+  for (const device::OffscreenDisplay* display : shown)
+    EXPECT_EQ(cv::countNonZero(display->image().reshape(1)), 0);
 }
 
 }  // namespace
