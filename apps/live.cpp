@@ -194,9 +194,13 @@ Result<std::unique_ptr<remote::Server>> serve(const LiveOptions& options,
   LIMN_TRY(const fs::path own, user_folder());
   auto tablet_view = remote::TabletView::create(setup, own / "lenses");
   if (!tablet_view) log_warning("live: the remote shows no live images: {}", tablet_view.message());
+  auto locator = remote::CameraLocator::create(setup);
+  if (!locator) log_warning("live: the cameras of glasses are not used: {}", locator.message());
   LIMN_TRY(std::unique_ptr<remote::Server> server,
-           remote::Server::open(serve, tablet_view ? remote::image_providers(std::move(*tablet_view))
-                                                   : remote::ImageProviders{}));
+           remote::Server::open(serve, tablet_view
+                                           ? remote::image_providers(std::move(*tablet_view),
+                                                                     locator ? std::move(*locator) : nullptr)
+                                           : remote::ImageProviders{}));
   if (!options.serve_show.empty()) server->show_code(options.serve_show, scene::Role::work);
   return server;
 }

@@ -23,9 +23,15 @@ class GlassesClients {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// `clients` must outlive this object.
-  GlassesClients(const WsClients* clients, SetViewpoint set_viewpoint)
-      : clients_(clients), set_viewpoint_(std::move(set_viewpoint)) {}
+  /// `clients` and `providers` must outlive this object. Answers of `providers` come back through `post`.
+  GlassesClients(const WsClients* clients,
+                 SetViewpoint set_viewpoint,
+                 const ImageProviders* providers = nullptr,
+                 NetworkPost post = {})
+      : clients_(clients),
+        set_viewpoint_(std::move(set_viewpoint)),
+        providers_(providers),
+        post_(std::move(post)) {}
 
   /// Puts glasses on or takes them off. Errors: the scene has no marker for them, or all are in use.
   Status update_glasses(const std::shared_ptr<WsClient>& client, const GlassesMessage& message);
@@ -34,6 +40,14 @@ class GlassesClients {
                       const GlassesPoseMessage& message,
                       Clock::time_point now);
   Status receive_state(const std::shared_ptr<WsClient>& client, const GlassesStateMessage& message);
+  /// Takes the announcement of a picture of the glasses' camera. Errors: no glasses are on, or they have a
+  /// marker; the lens or the pose is nonsense. The picture is then left out.
+  Status receive_view(const std::shared_ptr<WsClient>& client, const GlassesViewMessage& message);
+  /// Takes the picture itself, if one was announced; while one is looked at others are left out. Errors: no
+  /// JPEG, or another number.
+  Status receive_view_image(const std::shared_ptr<WsClient>& client,
+                            std::span<const std::uint8_t> bytes,
+                            Clock::time_point now);
   void take_off(const std::shared_ptr<WsClient>& client);
 
   /// A line for each guest with glasses, for the operator.
@@ -47,12 +61,19 @@ class GlassesClients {
  private:
   std::vector<std::string> markers() const;
   std::shared_ptr<WsClient> user_of(const std::string& marker, const std::shared_ptr<WsClient>& but) const;
-  Result<std::string> marker_for(const std::shared_ptr<WsClient>& client, const std::string& wish) const;
+  Result<std::string> marker_for(const std::shared_ptr<WsClient>& client,
+                                 const GlassesMessage& message) const;
+  bool can_locate() const { return providers_ && providers_->locate_camera; }
   double session_s(Clock::time_point now) const;
   void send(const std::shared_ptr<WsClient>& client);
+  void take_located(const std::shared_ptr<WsClient>& client,
+                    const GlassesViewMessage& view,
+                    const LocatedCamera& camera);
 
   const WsClients* clients_;
   SetViewpoint set_viewpoint_;
+  const ImageProviders* providers_;
+  NetworkPost post_;
   std::shared_ptr<const scene::Scene> scene_;
   std::string parts_;     // the newest message of parts
   Stamp session_at_;      // the session's clock …

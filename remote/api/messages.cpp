@@ -72,8 +72,8 @@ class Reader {
     return value->get<std::uint64_t>();
   }
 
-  bool boolean(const char* key) {
-    const json* value = member(key, false);
+  bool boolean(const char* key, bool may_be_absent = false) {
+    const json* value = member(key, may_be_absent);
     if (!value) return false;
     if (!value->is_boolean()) return problem(key, "true or false", found_in(*value)), false;
     return value->get<bool>();
@@ -185,17 +185,28 @@ Message read_message(const std::string& type, Reader* reader) {
     return window;
   }
   if (type == "glasses")
-    return GlassesMessage{reader->boolean("on"), reader->text("marker", k_longest_word, true)};
+    return GlassesMessage{reader->boolean("on"), reader->text("marker", k_longest_word, true),
+                          reader->boolean("camera", true)};
   if (type == "glasses_pose")
     return GlassesPoseMessage{reader->real("at_s"), reader->reals<4>("rotation_wxyz"),
                               reader->reals<3>("translation_m")};
+  if (type == "glasses_view") {
+    GlassesViewMessage view{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu)),
+                            reader->real("at_s"), reader->reals<4>("rotation_wxyz"),
+                            reader->reals<3>("translation_m")};
+    view.width = static_cast<int>(reader->number("width", 0xffff));
+    view.height = static_cast<int>(reader->number("height", 0xffff));
+    view.lens_px = reader->reals<4>("lens_px");
+    return view;
+  }
   if (type == "glasses_state") {
     const std::string is = reader->text("is", k_longest_word, false);
     if (is != "asleep" && is != "lost") reader->problem("is", "asleep or lost", in_quotes(is));
     return GlassesStateMessage{is == "asleep"};
   }
-  reader->problem("type", "edit, comment, pictures, seen, window, glasses, glasses_pose or glasses_state",
-                  in_quotes(type));
+  reader->problem(
+      "type", "edit, comment, pictures, seen, window, glasses, glasses_pose, glasses_view or glasses_state",
+      in_quotes(type));
   return {};
 }
 

@@ -53,7 +53,21 @@ struct WindowMessage {
 /// `glasses`: puts glasses on or takes them off.
 struct GlassesMessage {
   bool on = false;
-  std::string marker;  ///< The marker on them; empty: the first of the scene's that no others use.
+  std::string marker;   ///< The marker on them; empty: the first of the scene's that no others use, or
+                        ///< else their camera; k_by_camera: their camera.
+  bool camera = false;  ///< The browser gives pictures of their camera.
+};
+/// Instead of a marker's name: the glasses are registered by their camera.
+inline constexpr const char* k_by_camera = "camera";
+/// `glasses_view`: announces a picture of the glasses' camera, which follows as a binary message with this
+/// number: the camera's pose in the frame of the odometry (WebXR's view) at the page's moment, and its lens.
+struct GlassesViewMessage {
+  std::uint32_t image = 0;
+  double at_s = 0;
+  Eigen::Vector4d rotation_wxyz = {1, 0, 0, 0};  ///< As sent; it may be of any length.
+  Eigen::Vector3d translation_m = {0, 0, 0};
+  int width = 0, height = 0;
+  Eigen::Vector4d lens_px = {0, 0, 0, 0};  ///< fx, fy, cx, cy; pixel (0, 0) is the first one's centre
 };
 /// `glasses_pose`: the eye's pose by the glasses' odometry, feed_from_eye, at a moment of the page's clock.
 struct GlassesPoseMessage {
@@ -72,6 +86,7 @@ using Message = std::variant<EditMessage,
                              WindowMessage,
                              GlassesMessage,
                              GlassesPoseMessage,
+                             GlassesViewMessage,
                              GlassesStateMessage>;
 
 /// Parses a text message. Errors say what was expected: no JSON object, an unknown type or action, keys that

@@ -75,7 +75,7 @@ RequestHandler::RequestHandler(Setup setup)
       session_files_(setup_.worker),
       room_images_(&clients_, &setup_.providers, setup_.post),
       tablet_windows_(&clients_, &setup_.providers, setup_.set_viewpoint, setup_.post),
-      glasses_(&clients_, setup_.set_viewpoint) {}
+      glasses_(&clients_, setup_.set_viewpoint, &setup_.providers, setup_.post) {}
 
 // ---- HTTP ----
 
@@ -214,6 +214,7 @@ std::variant<std::shared_ptr<WebSocketPeer>, HttpResponse> RequestHandler::accep
     return error_response(k_http_not_found, "expected /api/live for a WebSocket.");
   auto client = std::make_shared<WsClient>();
   client->guest = *guest;
+  client->number = ++client_numbers_;
   return std::make_shared<Connection>(this, std::move(client));
 }
 
@@ -253,7 +254,9 @@ void RequestHandler::receive_text(const ClientPtr& client, std::string_view text
 
 void RequestHandler::receive_bytes(const ClientPtr& client, std::span<const std::uint8_t> bytes) {
   if (!is_within_rate(client)) return;
-  const Status received = tablet_windows_.receive_frame(client, bytes);
+  const Status received = client->glasses && client->glasses->announced
+                              ? glasses_.receive_view_image(client, bytes, Clock::now())
+                              : tablet_windows_.receive_frame(client, bytes);
   if (!received) refuse_message(client, std::nullopt, received.message());
 }
 
@@ -289,6 +292,11 @@ void RequestHandler::handle_message(const ClientPtr& client, const GlassesMessag
 
 void RequestHandler::handle_message(const ClientPtr& client, const GlassesPoseMessage& message) {
   const Status received = glasses_.receive_pose(client, message, Clock::now());
+  if (!received) refuse_message(client, std::nullopt, received.message());
+}
+
+void RequestHandler::handle_message(const ClientPtr& client, const GlassesViewMessage& message) {
+  const Status received = glasses_.receive_view(client, message);
   if (!received) refuse_message(client, std::nullopt, received.message());
 }
 

@@ -113,6 +113,7 @@ class RequestHandler : public HttpHandler {
   void handle_message(const ClientPtr& client, const WindowMessage& message);
   void handle_message(const ClientPtr& client, const GlassesMessage& message);
   void handle_message(const ClientPtr& client, const GlassesPoseMessage& message);
+  void handle_message(const ClientPtr& client, const GlassesViewMessage& message);
   void handle_message(const ClientPtr& client, const GlassesStateMessage& message);
 
   std::optional<HttpResponse> add_comment(const AuthSessions::Guest& guest,
@@ -129,6 +130,7 @@ class RequestHandler : public HttpHandler {
   Setup setup_;
   Authentication authentication_;
   WsClients clients_;
+  std::uint64_t client_numbers_ = 0;
   StatePublisher state_;
   PendingEdits edits_;
   CommentStore comments_;

@@ -83,8 +83,14 @@ struct WsClient {
 
   /// Glasses that draw the parts themselves (GlassesClients).
   struct Glasses {
-    explicit Glasses(const std::string& marker_name) : marker(marker_name), registration(marker_name) {}
-    std::string marker;  ///< The name of the marker on them.
+    explicit Glasses(const std::string& marker_name)
+        : marker(marker_name),
+          registration(marker_name, marker_name == k_by_camera ? camera_options() : GlassesOptions{}) {}
+    std::string marker;                           ///< The name of the marker on them, or k_by_camera.
+    bool has_camera = false;                      ///< The browser gives pictures of their camera.
+    std::optional<GlassesViewMessage> announced;  ///< The next binary message is this picture.
+    /// When the picture was given to the locator whose answer is awaited.
+    std::optional<std::chrono::steady_clock::time_point> locating_since;
     GlassesRegistration registration;
     GlassesState state = GlassesState::waiting;  ///< As all guests know it.
     std::string sent;                            ///< The last message.
@@ -99,9 +105,12 @@ struct WsClient {
   Window window;
   std::optional<Glasses> glasses;  ///< nullopt: it has none on.
   std::chrono::steady_clock::time_point glasses_refused_at;
+  std::uint64_t number = 0;  ///< Another one for each client.
 
   /// The longest message that it may send now, bytes.
-  std::size_t longest_message() const { return window.is_open() ? k_longest_frame : k_longest_message; }
+  std::size_t longest_message() const {
+    return window.is_open() || (glasses && glasses->announced) ? k_longest_frame : k_longest_message;
+  }
 };
 
 using WsClients = std::vector<std::shared_ptr<WsClient>>;

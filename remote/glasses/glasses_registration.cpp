@@ -73,7 +73,27 @@ Matrix6d drift_about(const Vector3d& p, const Pose& world_from_feed, const Matri
   return moved * drift * moved.transpose();
 }
 
+// The camera of a view in the world, with the axes of WebXR.
+MeasuredMarker measured_camera(const MeasuredView& view, double at_s) {
+  const Pose turned(Eigen::Quaterniond(0, 1, 0, 0), Vector3d::Zero());
+  const Pose world_from_camera = view.camera_from_world.inverse();
+  const Matrix3d r = world_from_camera.rotation_matrix();
+  Matrix6d by_inverse = Matrix6d::Zero();
+  by_inverse.topLeftCorner<3, 3>() = by_inverse.bottomRightCorner<3, 3>() = -r;
+  by_inverse.bottomLeftCorner<3, 3>() = -r * skew(view.camera_from_world.translation);
+  return {at_s, world_from_camera * turned, by_inverse * view.covariance * by_inverse.transpose(),
+          by_inverse * view.by_lens};
+}
+
 }  // namespace
+
+GlassesOptions camera_options() {
+  GlassesOptions options;
+  options.by_camera = true;
+  options.odometry_m = 0.12e-3;
+  options.odometry_rad = 0.25e-3;
+  return options;
+}
 
 GlassesRegistration::GlassesRegistration(std::string marker, const GlassesOptions& options)
     : marker_(std::move(marker)), options_(options) {}
@@ -128,11 +148,33 @@ Status GlassesRegistration::add_eye(const Eigen::Vector4d& rotation_wxyz,
 }
 
 void GlassesRegistration::add_marker(const MeasuredMarker& marker) {
+  if (options_.by_camera) return;
   if (!marker.world_from_marker.is_finite() || !marker.covariance.allFinite()) return;
   if (marker_seen_s_ && marker.at_s <= *marker_seen_s_) return;
   marker_seen_s_ = marker.at_s;
   markers_.push_back(marker);
   if (markers_.size() > k_most_pairs) markers_.pop_front();
+}
+
+void GlassesRegistration::add_view(const MeasuredView& view) {
+  if (!std::isfinite(view.at_s) || !view.feed_from_camera.is_finite() ||
+      !view.camera_from_world.is_finite() || !view.covariance.allFinite())
+    return;
+  if (is_suspended_ || eyes_.empty() || view.at_s < eyes_.front().at_s ||
+      view.at_s > eyes_.back().at_s + k_gap_s)
+    return;
+  const MeasuredMarker camera = measured_camera(view, view.at_s + clock_offset_s_);
+  if (marker_seen_s_ && camera.at_s <= *marker_seen_s_) return;
+  marker_seen_s_ = camera.at_s;
+  view_problem_.clear();
+  if (!filter_) {
+    filter_.emplace();
+    filter_->covariance.block<6, 6>(6, 6) = diagonal(options_.camera_rad, options_.camera_m);
+    const Vector3d lens(options_.focal_share, options_.centre_share, options_.centre_share);
+    filter_->covariance.bottomRightCorner<3, 3>() = lens.cwiseAbs2().asDiagonal();
+    is_feed_new_ = true;
+  }
+  continue_with(camera, {view.feed_from_camera, Vector6d::Zero()});
 }
 
 void GlassesRegistration::set_lost() {
@@ -199,28 +241,34 @@ void GlassesRegistration::predict_to(double at_s, const Pose& feed_from_eye, Fil
 // Updates the filter by one pair. False: the pair lies outside of the gate, or has no pose; it is not used.
 bool GlassesRegistration::use_pair(const MeasuredMarker& marker, Filter* filter) const {
   const auto eye = eye_at(marker.at_s - clock_offset_s_ - filter->delay_s);
-  if (!eye) return false;
-  predict_to(marker.at_s, eye->pose, filter);
-  const Pose &a = marker.world_from_marker, &x = filter->marker_from_eye, &y = filter->world_from_feed;
+  return eye && use_pair(marker, *eye, filter);
+}
+
+bool GlassesRegistration::use_pair(const MeasuredMarker& marker, const Moving& eye, Filter* filter) const {
+  predict_to(marker.at_s, eye.pose, filter);
+  const Pose a = boxplus(marker.world_from_marker, -marker.by_lens * filter->lens);
+  const Pose &x = filter->marker_from_eye, &y = filter->world_from_feed;
   const Matrix3d ra = a.rotation_matrix(), ry = y.rotation_matrix();
-  Eigen::Matrix<double, 6, 13> jacobian = Eigen::Matrix<double, 6, 13>::Zero();
+  Eigen::Matrix<double, 6, k_size> jacobian = Eigen::Matrix<double, 6, k_size>::Zero();
   jacobian.topLeftCorner<6, 6>() = -Matrix6d::Identity();
-  jacobian.block<3, 3>(3, 0) = skew(y.rotation * eye->pose.translation);
+  jacobian.block<3, 3>(3, 0) = skew(y.rotation * eye.pose.translation);
   jacobian.block<3, 3>(0, 6) = jacobian.block<3, 3>(3, 9) = ra;
-  jacobian.col(12) << ry * eye->speed.head<3>(), ry * eye->speed.tail<3>();
+  jacobian.col(12) << ry * eye.speed.head<3>(), ry * eye.speed.tail<3>();
   Matrix6d by_marker = Matrix6d::Identity();
   by_marker.block<3, 3>(3, 0) = -skew(a.rotation * x.translation);
-  const Vector6d residual = boxminus(a * x, y * eye->pose);
+  jacobian.rightCols<3>() = -by_marker * marker.by_lens;
+  const Vector6d residual = boxminus(a * x, y * eye.pose);
   const Matrix6d innovation = jacobian * filter->covariance * jacobian.transpose() +
                               by_marker * marker.covariance * by_marker.transpose() +
                               diagonal(options_.odometry_rad, options_.odometry_m);
   const Eigen::LLT<Matrix6d> factor(innovation);
   if (residual.dot(factor.solve(residual)) > k_gate) return false;
-  const Eigen::Matrix<double, 13, 6> gain = factor.solve(jacobian * filter->covariance).transpose();
-  const Eigen::Matrix<double, 13, 1> step = -gain * residual;
+  const Eigen::Matrix<double, k_size, 6> gain = factor.solve(jacobian * filter->covariance).transpose();
+  const Eigen::Matrix<double, k_size, 1> step = -gain * residual;
   filter->world_from_feed = boxplus(y, step.head<6>());
   filter->marker_from_eye = boxplus(x, step.segment<6>(6));
   filter->delay_s += step[12];
+  filter->lens += step.tail<3>();
   filter->covariance -= gain * innovation * gain.transpose();
   filter->covariance = 0.5 * (filter->covariance + filter->covariance.transpose()).eval();
   return true;
@@ -326,19 +374,24 @@ void GlassesRegistration::continue_filter() {
       if (first_.size() > k_most_pairs) first_.erase(first_.begin());
       continue;
     }
-    if (is_feed_new_) restart_feed(marker, pose);
-    const bool is_used = use_pair(marker, &*filter_);
-    rejected_in_turn_ = is_used ? 0 : rejected_in_turn_ + 1;
-    ++(is_used ? used_ : left_out_);
-    accepted_since_start_ += is_used;
-    if (is_used) turned_rad_ = std::max(turned_rad_, angle_between(started_facing_, pose.rotation));
-    if (rejected_in_turn_ < k_contradicted_after) continue;
-    // The marker sits elsewhere on the glasses now, or on others.
-    filter_.reset();
-    first_.clear();
-    last_marker_.reset();
-    return;
+    if (!continue_with(marker, *eye)) return;
   }
+}
+
+// Updates the filter by one pair. False: it was dropped, since the pairs contradict it.
+bool GlassesRegistration::continue_with(const MeasuredMarker& marker, const Moving& eye) {
+  if (is_feed_new_) restart_feed(marker, eye.pose);
+  const bool is_used = use_pair(marker, eye, &*filter_);
+  rejected_in_turn_ = is_used ? 0 : rejected_in_turn_ + 1;
+  ++(is_used ? used_ : left_out_);
+  accepted_since_start_ += is_used;
+  if (is_used) turned_rad_ = std::max(turned_rad_, angle_between(started_facing_, eye.pose.rotation));
+  if (rejected_in_turn_ < k_contradicted_after) return true;
+  // The marker sits elsewhere on the glasses now, or on others; or the first view was wrong.
+  filter_.reset();
+  first_.clear();
+  last_marker_.reset();
+  return false;
 }
 
 GlassesPlace GlassesRegistration::place_of(const Filter& filter, double now_s) const {
@@ -378,6 +431,13 @@ std::string GlassesRegistration::missing_motion() const {
   return "Keep looking round, so that the room's cameras see the marker from more sides.";
 }
 
+std::string GlassesRegistration::unseen_advice() const {
+  if (!options_.by_camera)
+    return fmt::format("No camera of the room sees the marker {} on the glasses. Turn to a camera.", marker_);
+  return view_problem_.empty() ? "The glasses' camera has shown no markers yet. Look at the prototype."
+                               : view_problem_;
+}
+
 void GlassesRegistration::decide_state(double now_s) {
   const bool was_registered = state_ == GlassesState::registered;
   place_.reset();
@@ -391,12 +451,12 @@ void GlassesRegistration::decide_state(double now_s) {
     advice_ = is_suspended_ ? "The glasses have lost their tracking. Look round slowly, in good light."
                             : "No poses arrive from the glasses. Is the page still open?";
   } else {
-    advice_ = is_unseen
-                  ? fmt::format("No camera of the room sees the marker {} on the glasses. Turn to a camera.",
-                                marker_)
+    advice_ = is_unseen           ? unseen_advice()
               : !problem_.empty() ? problem_
-                                  : missing_motion();
-    if (filter_ && !is_feed_new_ && turned_rad_ >= k_trusted_turn &&
+              : options_.by_camera
+                  ? "Look round at the prototype, so that its markers are seen from more sides."
+                  : missing_motion();
+    if (filter_ && !is_feed_new_ && (options_.by_camera || turned_rad_ >= k_trusted_turn) &&
         accepted_since_start_ >= k_trusted_after) {
       const GlassesPlace place = place_of(*filter_, now_s);
       const double most_m = was_registered ? options_.give_up_m : options_.use_m;
@@ -415,7 +475,7 @@ void GlassesRegistration::decide_state(double now_s) {
 
 void GlassesRegistration::update(double now_s) {
   if (!is_suspended_) continue_filter();
-  if (!filter_ && now_s - last_start_s_ >= k_start_interval_s) {
+  if (!options_.by_camera && !filter_ && now_s - last_start_s_ >= k_start_interval_s) {
     last_start_s_ = now_s;
     start_filter(now_s);
   }

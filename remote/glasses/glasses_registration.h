@@ -18,6 +18,8 @@ struct MeasuredMarker {
   double at_s = 0;  ///< By the session's clock.
   Pose world_from_marker;
   Matrix6d covariance = Matrix6d::Identity() * 1e-6;
+  /// By the lens's errors, as in MeasuredView; 0 for the room's cameras.
+  Eigen::Matrix<double, 6, 3> by_lens = Eigen::Matrix<double, 6, 3>::Zero();
 };
 
 /// The eye of a pair of glasses by their own odometry (the feed).
@@ -27,8 +29,19 @@ struct OdometryPose {
   Pose feed_from_eye;
 };
 
+/// The glasses' own camera at a moment, as the markers in its picture give it, and as the odometry does.
+struct MeasuredView {
+  double at_s = 0;         ///< By the page's clock, at the frame that both belong to.
+  Pose feed_from_camera;   ///< By the odometry; here the camera has y up and looks along -z, as in WebXR.
+  Pose camera_from_world;  ///< By the markers; here it has y down and looks along z, as an imager.
+  Matrix6d covariance = Matrix6d::Identity() * 1e-6;  ///< For camera_from_world.
+  /// How camera_from_world (boxplus's delta) depends on errors of the stated lens: a share of the focal
+  /// length, and the image's centre in x and y as shares of the focal length.
+  Eigen::Matrix<double, 6, 3> by_lens = Eigen::Matrix<double, 6, 3>::Zero();
+};
+
 enum class GlassesState {
-  waiting,        ///< The cameras have not seen the marker yet.
+  waiting,        ///< The cameras have not seen the marker yet, or the glasses' camera no markers.
   looking_round,  ///< The registration needs more motion; advice() says which.
   registered,     ///< world_from_feed is known well enough to draw with.
   lost,           ///< The glasses do not track, or their poses no longer arrive.
@@ -46,14 +59,23 @@ struct GlassesOptions {
   /// The registration is used below these standard deviations at the eye, and given up above the others.
   double use_m = 2e-3, use_rad = 0.1 * 0.017453;
   double give_up_m = 10e-3, give_up_rad = 0.5 * 0.017453;
+  /// The glasses have no marker; add_view() gets what their own camera sees.
+  bool by_camera = false;
+  /// Standard deviations of constant errors of what the browser states of the camera: its pose, the focal
+  /// length as a share, and the image's centre as a share of the focal length. They are estimated, too.
+  double camera_m = 0.3e-3, camera_rad = 0.5e-3, focal_share = 1e-3, centre_share = 1e-3;
 };
+
+/// For glasses that are registered by their own camera. Its views are more exact than a marker on a head, and
+/// its pose belongs to the same frame, so that the noise of the odometry is stated less cautiously.
+GlassesOptions camera_options();
 
 /// The relation of a pair of glasses to the room.
 struct GlassesPlace {
   Pose world_from_feed;
   Matrix6d covariance = Matrix6d::Zero();  ///< As in boxplus (core/pose.h).
-  Pose marker_from_eye;
-  double delay_s = 0;  ///< The session's clock minus the page's, for the same motion.
+  Pose marker_from_eye;                    ///< By camera: the constant error of its pose.
+  double delay_s = 0;                      ///< The session's clock minus the page's, for the same motion.
   double delay_stddev_s = 0;
   double eye_stddev_m = 0, eye_stddev_rad = 0;  ///< The eye's newest pose in the world: the largest axis.
 };
@@ -64,8 +86,11 @@ struct GlassesPlace {
 /// Kalman filter over both poses and the delay uses each new pair once; world_from_feed is a random walk
 /// about the head, so that old pairs fade as the odometry drifts. Pairs far outside the stated covariance are
 /// left out; several in turn start the registration again, since the marker has moved on the glasses. After a
-/// jump of the odometry only world_from_feed starts again, with the marker_from_eye that is known. It has no
-/// clock and no threads.
+/// jump of the odometry only world_from_feed starts again, with the marker_from_eye that is known.
+///
+/// By the glasses' own camera (GlassesOptions::by_camera) the same filter starts with the first view: the
+/// camera takes the place of the marker and the eye alike, so that marker_from_eye is nearly the identity,
+/// and there is no delay, since picture and pose belong to one frame. It has no clock and no threads.
 class GlassesRegistration {
  public:
   /// `marker`: the marker's name, for messages.
@@ -80,6 +105,11 @@ class GlassesRegistration {
                  double received_at_s);
   /// In the order of time; others are left out.
   void add_marker(const MeasuredMarker& marker);
+  /// By camera only: in the order of time. One from before the odometry started or jumped, or with numbers
+  /// that are not finite, is left out.
+  void add_view(const MeasuredView& view);
+  /// By camera only: why the newest picture gave no view, a sentence that says what to do.
+  void set_view_problem(const std::string& why) { view_problem_ = why; }
   /// The page says that the glasses do not track, sleep, or track again. After both the odometry counts as
   /// another one, since it may have jumped.
   void set_lost();
@@ -99,11 +129,13 @@ class GlassesRegistration {
   int left_out() const { return left_out_; }
 
  private:
-  using Matrix13d = Eigen::Matrix<double, 13, 13>;
+  static constexpr int k_size = 16;
+  using Covariance = Eigen::Matrix<double, k_size, k_size>;
   struct Filter {
     Pose world_from_feed, marker_from_eye;
     double delay_s = 0;
-    Matrix13d covariance = Matrix13d::Zero();  // [world_from_feed; marker_from_eye; delay]
+    Eigen::Vector3d lens = Eigen::Vector3d::Zero();  // errors as in MeasuredView::by_lens
+    Covariance covariance = Covariance::Zero();      // [world_from_feed; marker_from_eye; delay; lens]
     double at_s = 0;
   };
   struct Moving {
@@ -117,6 +149,9 @@ class GlassesRegistration {
   void start_filter(double now_s);
   Filter filtered(const Filter& prior, int* rejected) const;
   bool use_pair(const MeasuredMarker& marker, Filter* filter) const;
+  bool use_pair(const MeasuredMarker& marker, const Moving& eye, Filter* filter) const;
+  bool continue_with(const MeasuredMarker& marker, const Moving& eye);
+  std::string unseen_advice() const;
   void predict_to(double at_s, const Pose& feed_from_eye, Filter* filter) const;
   void continue_filter();
   void restart_feed(const MeasuredMarker& marker, const Pose& feed_from_eye);
@@ -141,7 +176,8 @@ class GlassesRegistration {
   Eigen::Quaterniond started_facing_ = Eigen::Quaterniond::Identity();  // when the feed was new
   double turned_rad_ = 0;                                               // the largest turn since then
   int used_ = 0, left_out_ = 0;
-  std::string problem_;  // why the filter could not be started
+  std::string problem_;       // why the filter could not be started
+  std::string view_problem_;  // why the newest picture gave no view
   GlassesState state_ = GlassesState::waiting;
   std::string advice_;
   std::optional<GlassesPlace> place_;

@@ -5,6 +5,7 @@
 
 #include "core/median.h"
 #include "core/names.h"
+#include "remote/tablet/pose_by_lens.h"
 #include "tracker/marker_pose.h"
 
 namespace limn::remote {
@@ -246,6 +247,11 @@ TabletPose TabletLocalizer::localize(const cv::Mat& bgr,
     return without_pose(k_go_nearer);
   out.markers = static_cast<int>(kept.size());
   out.rms_px = fit.rms_px;
+  const std::vector<tracker::PointObservation> fitted =
+      tracker::corners_at(kept.empty() ? corners : kept, fit.world_from_body).observations;
+  const double freedom = std::max(1.0, 2.0 * static_cast<double>(fitted.size()) - 6);
+  out.by_lens = pose_by_lens(fitted, fit);
+  out.covariance = std::max(1.0, fit.chi_square / freedom) * fit.covariance;
   const double gate_px = gate_of(corners, fit.world_from_body);
   camera.imager_from_world = fit.world_from_body;  // `view` and `fit` had the camera at the origin
   out.moved = moved_markers(camera, gate_px, detections, bodies, tracks);

@@ -22,6 +22,10 @@ struct TabletPose {
   std::string why;
   int markers = 0;    ///< How many markers the pose was fitted to.
   double rms_px = 0;  ///< The residual of their corners.
+  /// The covariance of the camera's pose, camera_from_world, for the lens as it is taken to be; and how the
+  /// pose depends on that lens (pose_by_lens.h).
+  Matrix6d covariance = Matrix6d::Zero();
+  Eigen::Matrix<double, 6, 3> by_lens = Eigen::Matrix<double, 6, 3>::Zero();
   /// New tracks of bodies of a single marker that the tablet sees elsewhere than `tracks` says, since
   /// somebody is moving them.
   std::vector<Track> moved;

@@ -27,6 +27,7 @@
 #include "projector/overlays/grid_and_split.h"
 #include "projector/renderer.h"
 #include "remote/tablet/intrinsics_store.h"
+#include "remote/tablet/square_bodies.h"
 #include "remote/tablet/tablet_image.h"
 #include "remote/tablet/tablet_localizer.h"
 #include "scene/posed_scene.h"
@@ -63,20 +64,6 @@ struct WaitingFrame {
   std::vector<std::uint8_t> jpeg;
   ImageCallback answer;
 };
-
-// The bodies of a scene, with the markers that people have paired with its slots.
-std::vector<Body> bodies_of(const scene::Scene& scene, const scene::ShowState& show_state) {
-  std::vector<Body> out;
-  if (scene.prototype) out.push_back({"prototype", scene.prototype->markers});
-  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
-    const scene::Slot& slot = scene.slots[i];
-    const MarkerName& carrier = scene::slot_marker(scene, show_state, i);
-    if (is_constellation(carrier)) continue;  // a tablet finds square markers only
-    const double size_m = carrier == slot.marker ? slot.size_m : scene::first_marker_size_m(scene);
-    out.push_back({slot.name, {{carrier, size_m, Pose()}}});
-  }
-  return out;
-}
 
 // The tracks of the scene's bodies at the moment of the room's newest image.
 std::vector<Track> tracks_of(const SessionSnapshot& snapshot) {
@@ -352,7 +339,7 @@ CompositeImage TabletView::Impl::frame_with_parts(const WaitingFrame& frame,
   const Pose turned_from_world = session::steadied(&still_world_from_prototype, &tracks);
   Device& device = device_state(frame.window.device);
   const TabletPose observation =
-      device.localizer.localize(*image, bodies_of(*snapshot.scene, snapshot.show_state), tracks);
+      device.localizer.localize(*image, square_bodies(*snapshot.scene, snapshot.show_state), tracks);
   const double track_ms = milliseconds_since(tracking);
   if (!observation.view) return no_image(observation.why);
 

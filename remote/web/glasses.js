@@ -31,6 +31,11 @@ export async function why_no_glasses() {
     : "Glasses: this device cannot show parts over what you see (no immersive-ar). Use the window instead.";
 }
 
+const seconds = (time) => Number((time / 1000).toFixed(5));
+
+// How the page calls what registers the glasses.
+const name_of = (marker) => (marker === "camera" ? "the glasses' own camera" : marker);
+
 class Glasses {
   #link;
   #stage;
@@ -41,6 +46,7 @@ class Glasses {
   #sent_at = 0;
   #is_tracking = true;
   #is_fetching = false;
+  #has_camera = false; // as Limn was told
   #placed_at = null; // the first frame that parts were drawn in
   #place = null; // the newest message `glasses`
   #parts = null; // the newest message `glasses_parts`
@@ -95,7 +101,7 @@ class Glasses {
 
   async put_on() {
     const xr = await navigator.xr.requestSession("immersive-ar", {
-      optionalFeatures: ["local-floor", "depth-sensing", "hand-tracking"],
+      optionalFeatures: ["local-floor", "depth-sensing", "hand-tracking", "camera-access"],
       depthSensing: { usagePreference: ["cpu-optimized", "gpu-optimized"], dataFormatPreference: ["luminance-alpha", "float32"] },
     });
     xr.addEventListener("end", () => this.#ended());
@@ -140,7 +146,8 @@ class Glasses {
   #announce() {
     if (!this.is_on) return;
     this.#problem = "";
-    this.#link.send({ type: "glasses", on: true, ...(this.marker ? { marker: this.marker } : {}) });
+    this.#has_camera = Boolean(this.#view.camera);
+    this.#link.send({ type: "glasses", on: true, camera: this.#has_camera, ...(this.marker ? { marker: this.marker } : {}) });
   }
 
   #report(is) {
@@ -191,9 +198,11 @@ class Glasses {
       if (!is_tracking) this.#report(is_hidden ? "asleep" : "lost");
       this.on_change();
     }
-    if (is_tracking && time - this.#sent_at >= k_pose_interval_ms) {
+    const at = frame.predictedDisplayTime ?? time;
+    const is_pictured = is_tracking && this.#take_picture(time, at, pose);
+    if (is_tracking && (is_pictured || time - this.#sent_at >= k_pose_interval_ms)) {
       this.#sent_at = time;
-      this.#send_pose(frame.predictedDisplayTime ?? time, pose.transform);
+      this.#send_pose(at, pose.transform);
     }
     const place = is_tracking && this.#place?.state === "registered" ? this.#place : null;
     if (place) this.#placed_at ??= time;
@@ -211,12 +220,25 @@ class Glasses {
     this.on_change();
   }
 
+  // Without a marker on the glasses Limn needs pictures of their camera. True: one is taken in this frame.
+  #take_picture(time, at, pose) {
+    if (this.#has_camera && !this.#view.camera) this.#announce(); // the frames have no camera
+    if (this.#place?.marker !== "camera" || !this.#view.camera) return false;
+    if (!this.#view.camera.constructor.may_send(this.#link.waiting_bytes)) return false;
+    const xr = this.#xr;
+    return this.#view.camera.take(time, pose, (message, bytes) => {
+      if (this.#xr !== xr || this.#place?.marker !== "camera") return;
+      this.#link.send({ ...message, at_s: seconds(at) });
+      this.#link.send(bytes);
+    });
+  }
+
   #send_pose(time, { orientation: q, position: p }) {
     if (!this.#place && !this.#parts && this.#problem) return; // Limn has refused these glasses
     const rounded = (values) => values.map((value) => Number(value.toFixed(6)));
     this.#link.send({
       type: "glasses_pose",
-      at_s: Number((time / 1000).toFixed(5)),
+      at_s: seconds(time),
       rotation_wxyz: rounded([q.w, q.x, q.y, q.z]),
       translation_m: rounded([p.x, p.y, p.z]),
     });
@@ -273,7 +295,7 @@ export function make_glasses(session, stage) {
     why.dataset.state = owner.state;
     marker.hidden = owner.markers.length < 2;
     if (marker.options.length !== owner.markers.length)
-      marker.replaceChildren(...owner.markers.map((name) => h("option", { value: name }, name)));
+      marker.replaceChildren(...owner.markers.map((name) => h("option", { value: name }, name_of(name))));
   };
   button.addEventListener("click", () => {
     if (owner.is_on) return owner.take_off();

@@ -1,6 +1,7 @@
 // Draws the parts for each eye of WebXR glasses, over what the person sees. For each eye the prototype is drawn first, into
 // textures: its depth, which hides parts, and where projectors light it. `rest` then leaves a part transparent wherever the ray
 // behind it meets lit prototype, because light shows it there (the rule of shaders/part_coverage.glsl).
+import { GlassesCamera } from "/glasses_camera.js";
 import { product, read_glb } from "/glb.js";
 import { delete_mesh, k_shading, make_program, upload_mesh } from "/mesh_gl.js";
 
@@ -499,6 +500,7 @@ export class GlassesView {
   #gl;
   #layer;
   #real_depth;
+  #camera = null; // null: the browser gives no pictures of it
   #light;
   #hands;
   #meshes;
@@ -535,6 +537,7 @@ export class GlassesView {
     this.#words_pass = make_pass(gl, k_words_vertex, k_words_fragment);
     this.#place_frame = gl.createFramebuffer();
     this.#real_depth = new RealDepth(xr, gl);
+    if (GlassesCamera.is_granted(xr)) this.#camera = new GlassesCamera(xr, gl);
     this.#words_texture = gl.createTexture();
     this.#words_quad = gl.createVertexArray();
     gl.bindVertexArray(this.#words_quad);
@@ -546,8 +549,14 @@ export class GlassesView {
   }
 
   close() {
+    this.#camera?.close();
     this.#meshes.clear();
     this.#gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  /** The glasses' camera; null: the browser gives no pictures of it. */
+  get camera() {
+    return this.#camera?.is_missing ? null : this.#camera;
   }
 
   /** What hides parts: "things" all of them, tracked "hands" alone, or "nothing" but the prototype. */

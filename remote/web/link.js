@@ -97,6 +97,11 @@ export class Link extends EventTarget {
       this.#socket.send(message instanceof ArrayBuffer ? message : JSON.stringify(message));
   }
 
+  /** Bytes that wait to be sent. */
+  get waiting_bytes() {
+    return this.#socket?.bufferedAmount ?? 0;
+  }
+
   /** Starts or stops the sending of room images. */
   want_pictures(wants) {
     if (wants === this.#wants_pictures) return;

@@ -94,7 +94,7 @@ TEST(RemoteMessages, AreThoseOfTheDocumentation) {
     types.insert(json::parse(text)["type"].get<std::string>());
   }
   EXPECT_EQ(types, (std::set<std::string>{"edit", "comment", "pictures", "seen", "window", "glasses",
-                                          "glasses_pose", "glasses_state"}));
+                                          "glasses_pose", "glasses_view", "glasses_state"}));
 }
 
 TEST(RemoteMessages, EveryActionIsAMessage) {
@@ -126,7 +126,9 @@ TEST(RemoteMessages, RefuseWithAReason) {
   has("{}", "type: expected it, found no such key");
   has(R"({"type": 3})", "type: expected text, found '3'");
   has(R"({"type": "dance"})",
-      "type: expected edit, comment, pictures, seen, window, glasses, glasses_pose or glasses_state, found "
+      "type: expected edit, comment, pictures, seen, window, glasses, glasses_pose, glasses_view or "
+      "glasses_state, "
+      "found "
       "'dance'");
   has(R"({"type": "edit", "id": 1, "action": "dance"})", "action: expected one of GET /api/actions");
   has(R"({"type": "edit", "id": -1, "action": "flip"})", "id: expected a whole number");
