@@ -198,12 +198,11 @@ Status calibrate_devices(const CalibrateOptions& options) {
   const Result<device::Desktop> desktop = device::Desktop::open();
   const device::Desktop* const there = desktop ? &*desktop : nullptr;
   std::unique_ptr<nodes::Room> room;
-  std::unique_ptr<device::DeviceOpener> opener = std::make_unique<device::LocalOpener>(there);
   if (!options.room.room.empty()) {
     LIMN_TRY(room, enter_room_for_orders(options.room));
-    opener = std::make_unique<nodes::RoomOpener>(room.get(), there);
   }
-  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, opener.get()));
+  nodes::RoomOpener opener(room.get(), there);
+  LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, &opener));
   return calibrate_on(options, std::move(devices), desktop);
 }
 

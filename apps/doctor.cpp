@@ -22,6 +22,7 @@
 #include "device/gl_context.h"
 #include "device/test_card.h"
 #include "device/v4l2_camera.h"
+#include "nodes/ros_camera.h"
 
 namespace limn::apps {
 namespace {
@@ -164,7 +165,7 @@ std::string setting_text(const device::CameraSetting& setting) {
 
 // Opens the camera, grabs frames and compares the requested settings with the reported ones.
 Finding tested(const std::string& area, const device::CameraConfig& wanted) {
-  auto camera = device::open_camera(wanted);
+  auto camera = nodes::open_camera_here(wanted);
   if (!camera) return failed(area, wanted.name, camera.message());
   const auto rate = measure_rate(**camera);
   if (!rate) return failed(area, wanted.name, rate.message());

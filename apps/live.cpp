@@ -343,11 +343,6 @@ session::SessionDevices opened(const device::Devices& devices, const Rig& rig, d
   return out;
 }
 
-std::unique_ptr<device::DeviceOpener> opener_for(HostedRoom* room, const device::Desktop* desktop) {
-  if (room) return std::make_unique<nodes::RoomOpener>(room->room(), desktop);
-  return std::make_unique<device::LocalOpener>(desktop);
-}
-
 Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
   session::SessionSetup setup;
@@ -375,8 +370,8 @@ Status play_with_devices(const LiveOptions& options) {
   if (!options.room.room.empty()) {
     LIMN_TRY(room, HostedRoom::open(options.room, devices, options.out, &setup));
   }
-  const std::unique_ptr<device::DeviceOpener> opener = opener_for(room.get(), desktop ? &*desktop : nullptr);
-  session::SessionDevices open = opened(devices, setup.rig, opener.get());
+  nodes::RoomOpener opener(room ? room->room() : nullptr, desktop ? &*desktop : nullptr);
+  session::SessionDevices open = opened(devices, setup.rig, &opener);
   return run_session(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
                      room ? room->client() : nullptr,
                      [&](const session::SessionParts& parts, session::Keys* keys) {

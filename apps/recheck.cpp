@@ -13,6 +13,7 @@
 #include "core/rig.h"
 #include "device/desktop.h"
 #include "device/devices_file.h"
+#include "nodes/remote_devices.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/device_backend.h"
@@ -55,7 +56,7 @@ Status capture_with_devices(const RecheckCommand& command, const fs::path& folde
   LIMN_TRY(const device::Devices all, device::load_devices(command.devices));
   LIMN_TRY(const device::Devices named, device::matched(all, rig));
   const Result<device::Desktop> desktop = device::Desktop::open();
-  device::LocalOpener opener(desktop ? &*desktop : nullptr);
+  nodes::RoomOpener opener(nullptr, desktop ? &*desktop : nullptr);
   LIMN_TRY(wizard::DeviceBackend::Devices devices, wizard::open_devices(named, &opener));
   LIMN_TRY(const calib::Board board, wizard::calibration_board(rig));
   const calib::CaptureSet captures = calib::plan_captures(

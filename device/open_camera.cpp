@@ -13,8 +13,9 @@ namespace limn::device {
 namespace {
 
 constexpr const char* k_forms =
-    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, gige:ID, a video file, an image, a "
-    "folder of images";
+    "http://HOST/PATH (MJPEG), rtsp://HOST/PATH, v4l2:/dev/video0, gige:ID, ros:/TOPIC, a video file, an "
+    "image, "
+    "a folder of images";
 
 using Opened = Result<std::unique_ptr<CameraSource>>;
 

@@ -6,6 +6,7 @@
 #include "device/devices_file.h"
 #include "device/gige_camera.h"
 #include "device/v4l2_camera.h"
+#include "nodes/ros_camera.h"
 
 namespace limn::nodes {
 
@@ -44,7 +45,7 @@ void NodeDisplays::darken() {
 Result<device::CameraSource*> NodeCameras::camera(const device::CameraConfig& config) {
   std::unique_ptr<device::CameraSource>& camera = cameras_[device::devices_text({&config, 1}, {})];
   if (!camera) {
-    LIMN_TRY(camera, device::open_camera(config));
+    LIMN_TRY(camera, open_camera_here(config));
   }
   return camera.get();
 }

@@ -39,7 +39,7 @@ class NodeCameras {
   /// The cameras that are plugged in or answer on the network, by their sources. Takes about a second.
   static std::vector<OfferedDevice> found();
 
-  /// The camera of that configuration. Errors are those of device::open_camera.
+  /// The camera of that configuration. Errors are those of open_camera_here().
   Result<device::CameraSource*> camera(const device::CameraConfig& config);
   void close_all() { cameras_.clear(); }
 

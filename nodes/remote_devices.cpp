@@ -7,6 +7,7 @@
 #include "device/devices_file.h"
 #include "device/jpeg.h"
 #include "device/offscreen_display.h"
+#include "nodes/ros_camera.h"
 
 namespace limn::nodes {
 namespace {
@@ -100,13 +101,14 @@ Result<Frame> RemoteCamera::next() {
 }
 
 Result<std::unique_ptr<device::Display>> RoomOpener::display(const device::DisplayConfig& config) {
-  if (config.host.empty()) return local_.display(config);
+  if (!room_ || config.host.empty()) return local_.display(config);
   LIMN_TRY(std::unique_ptr<device::Display> display, RemoteDisplay::open(room_, config));
   return display;
 }
 
 Result<std::unique_ptr<device::CameraSource>> RoomOpener::camera(const device::CameraConfig& config) {
-  if (config.host.empty()) return local_.camera(config);
+  if (config.host.empty()) return open_camera_here(config);
+  if (!room_) return local_.camera(config);  // says what is missing
   LIMN_TRY(std::unique_ptr<device::CameraSource> camera, RemoteCamera::open(room_, config));
   return camera;
 }

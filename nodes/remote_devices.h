@@ -57,10 +57,11 @@ class RemoteCamera final : public device::CameraSource {
   Stamp captured_at_;
 };
 
-/// Opens devices at the machine that their configuration names: a node of the room, or this one.
+/// Opens devices at the machine that their configuration names: a node of the room, or this one. Cameras
+/// of ROS 2 (`ros:/TOPIC`), too.
 class RoomOpener final : public device::DeviceOpener {
  public:
-  /// Borrows both; `desktop` may be null.
+  /// Borrows both. `room` may be null: then a device at another machine is an error. `desktop` may be null.
   RoomOpener(Room* room, const device::Desktop* desktop) : room_(room), local_(desktop) {}
   Result<std::unique_ptr<device::Display>> display(const device::DisplayConfig& config) override;
   Result<std::unique_ptr<device::CameraSource>> camera(const device::CameraConfig& config) override;

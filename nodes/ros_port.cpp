@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "nodes/engine_library.h"
+#include "nodes/ros_image_feed.h"
 
 namespace limn::nodes {
 namespace {
@@ -20,7 +21,13 @@ std::string_view variable(const char* name) {
 
 Result<RosNetwork> ros_network() {
   RosNetwork out;
-  out.is_local_only = variable("ROS_LOCALHOST_ONLY") == "1";
+  // The older variable counts, as in ROS 2.
+  const std::string_view range = variable("ROS_AUTOMATIC_DISCOVERY_RANGE");
+  out.is_local_only = variable("ROS_LOCALHOST_ONLY") == "1" || range == "LOCALHOST";
+  if (!out.is_local_only && range == "OFF")
+    return error(
+        "ROS_AUTOMATIC_DISCOVERY_RANGE: expected SUBNET or LOCALHOST, found OFF, with which no program finds "
+        "another. Set it as for the other programs.");
   const std::string_view text = variable("ROS_DOMAIN_ID");
   if (text.empty()) return out;
   const char* end = text.data() + text.size();
@@ -37,6 +44,15 @@ Result<std::unique_ptr<exchange::RosPort>> open_ros_port() {
   std::unique_ptr<exchange::RosPort> port(reinterpret_cast<OpenRosPort*>(function)(network, &problem));
   if (!port) return Error{problem};
   return port;
+}
+
+Result<std::unique_ptr<RosImageFeed>> open_ros_images(const std::string& topic) {
+  LIMN_TRY(const RosNetwork network, ros_network());
+  LIMN_TRY(void* function, engine_function(k_open_ros_images));
+  std::string problem;
+  std::unique_ptr<RosImageFeed> feed(reinterpret_cast<OpenRosImages*>(function)(network, topic, &problem));
+  if (!feed) return Error{problem};
+  return feed;
 }
 
 }  // namespace limn::nodes

@@ -11,9 +11,10 @@ namespace limn::nodes {
 /// How ROS 2's programs on this machine find each other.
 struct RosNetwork {
   int domain = 0;              ///< ROS_DOMAIN_ID
-  bool is_local_only = false;  ///< ROS_LOCALHOST_ONLY
+  bool is_local_only = false;  ///< ROS_LOCALHOST_ONLY, ROS_AUTOMATIC_DISCOVERY_RANGE
 };
-/// Reads it from the environment. Error: ROS_DOMAIN_ID is no number from 0 to 232.
+/// Reads it from the environment. Error: ROS_DOMAIN_ID is no number from 0 to 232, or
+/// ROS_AUTOMATIC_DISCOVERY_RANGE is OFF.
 Result<RosNetwork> ros_network();
 
 /// Enters ROS 2's network, without DDS Security. Cyclone DDS's own settings (CYCLONEDDS_URI) apply. Error:

@@ -11,6 +11,7 @@
 
 #include "exchange/poses/pose_limits.h"
 #include "nodes/dds/qualities.h"
+#include "nodes/dds/ros_domain.h"
 #include "nodes/dds/samples.h"
 #include "nodes/ros_port.h"
 #include "ros_poses.h"
@@ -33,14 +34,7 @@ const dds_topic_descriptor_t* type_of(bool has_transforms) {
   return has_transforms ? &tf2_msgs_msg_dds__TFMessage__desc : &geometry_msgs_msg_dds__PoseStamped__desc;
 }
 
-Qos common_qos(bool has_transforms) {
-  Qos qos(dds_create_qos());
-  dds_qset_durability(qos.get(), DDS_DURABILITY_VOLATILE);
-  dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, has_transforms ? k_transforms_depth : k_pose_depth);
-  const dds_data_representation_id_t xcdr1 = DDS_DATA_REPRESENTATION_XCDR1;
-  dds_qset_data_representation(qos.get(), 1, &xcdr1);
-  return qos;
-}
+Qos common_qos(bool has_transforms) { return ros_qos(has_transforms ? k_transforms_depth : k_pose_depth); }
 // ROS 2's default. A slow subscriber loses samples; the session does not wait for it.
 Qos ros_writer_qos(bool has_transforms) {
   Qos qos = common_qos(has_transforms);
@@ -52,7 +46,6 @@ Qos ros_writer_qos(bool has_transforms) {
 Qos ros_reader_qos(bool has_transforms) {
   Qos qos = common_qos(has_transforms);
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
-  dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
   return qos;
 }
 
@@ -103,7 +96,7 @@ TransformStamped transform_sample(const RosPose& pose) {
 class DdsRosPort final : public exchange::RosPort {
  public:
   ~DdsRosPort() override {
-    if (domain_ > 0) dds_delete(domain_);
+    for (const dds_entity_t entity : entities_) dds_delete(entity);
   }
   Status open(const RosNetwork& network);
 
@@ -120,47 +113,20 @@ class DdsRosPort final : public exchange::RosPort {
     std::deque<RosMessage> waiting;
   };
 
-  Result<dds_entity_t> make_topic(const std::string& topic, bool has_transforms);
   Result<dds_entity_t> writer_of(const std::string& topic, bool has_transforms);
   static void notice_data(dds_entity_t reader, void* subscription);
   static void keep(RosMessage message, Subscription* subscription);
-  static Error failed(const std::string& what, dds_return_t code) {
-    return error(
-        "ROS 2: {}: expected success, found: {}. Check the network, ROS_DOMAIN_ID and CYCLONEDDS_URI.", what,
-        dds_strretcode(code));
-  }
 
-  dds_entity_t domain_ = 0, participant_ = 0;
+  RosDomain domain_;
+  std::vector<dds_entity_t> entities_;  // its readers and writers
   std::mutex mutex_;
   std::vector<std::unique_ptr<Subscription>> subscriptions_;
   std::map<std::string, dds_entity_t> writers_;
 };
 
 Status DdsRosPort::open(const RosNetwork& network) {
-  constexpr const char* k_local =
-      "<CycloneDDS><Domain><General><Interfaces><NetworkInterface "
-      "address=\"127.0.0.1\"/></Interfaces></General>"
-      "</Domain></CycloneDDS>,";
-  const char* own = std::getenv("CYCLONEDDS_URI");
-  const std::string config = (network.is_local_only ? k_local : "") + text_of(own);
-  const auto domain = static_cast<dds_domainid_t>(network.domain);
-  domain_ = dds_create_domain(domain, config.c_str());
-  if (domain_ == DDS_RETCODE_PRECONDITION_NOT_MET)
-    return error(
-        "ROS 2: expected domain {} to be free in this program, found the room in it. Use another "
-        "ROS_DOMAIN_ID, or a room of another name.",
-        network.domain);
-  if (domain_ < 0) return failed(fmt::format("domain {}", network.domain), domain_);
-  participant_ = dds_create_participant(domain, nullptr, nullptr);
-  if (participant_ < 0) return failed(fmt::format("domain {}", network.domain), participant_);
+  LIMN_TRY(domain_, RosDomain::enter(network));
   return {};
-}
-
-Result<dds_entity_t> DdsRosPort::make_topic(const std::string& topic, bool has_transforms) {
-  const dds_entity_t made =
-      dds_create_topic(participant_, type_of(has_transforms), ("rt" + topic).c_str(), nullptr, nullptr);
-  if (made < 0) return failed("topic " + topic, made);
-  return made;
 }
 
 Result<std::size_t> DdsRosPort::subscribe(const std::string& topic) {
@@ -168,15 +134,16 @@ Result<std::size_t> DdsRosPort::subscribe(const std::string& topic) {
   auto subscription = std::make_unique<Subscription>();
   subscription->topic = topic;
   subscription->has_transforms = has_transforms;
-  LIMN_TRY(const dds_entity_t made, make_topic(topic, has_transforms));
+  LIMN_TRY(const dds_entity_t made, domain_.topic(topic, type_of(has_transforms)));
   const std::unique_ptr<dds_listener_t, decltype(&dds_delete_listener)> listener(
       dds_create_listener(subscription.get()), &dds_delete_listener);
   dds_lset_data_available(listener.get(), &DdsRosPort::notice_data);
   const Qos qos = ros_reader_qos(has_transforms);
   const std::lock_guard lock(mutex_);
   subscriptions_.push_back(std::move(subscription));
-  const dds_entity_t reader = dds_create_reader(participant_, made, qos.get(), listener.get());
-  if (reader < 0) return failed("topic " + topic, reader);
+  const dds_entity_t reader = dds_create_reader(domain_.participant(), made, qos.get(), listener.get());
+  if (reader < 0) return ros_failed("topic " + topic, reader);
+  entities_.push_back(reader);
   return subscriptions_.size() - 1;
 }
 
@@ -220,10 +187,11 @@ std::optional<RosMessage> DdsRosPort::next(std::size_t subscription) {
 Result<dds_entity_t> DdsRosPort::writer_of(const std::string& topic, bool has_transforms) {
   const std::lock_guard lock(mutex_);
   if (const auto known = writers_.find(topic); known != writers_.end()) return known->second;
-  LIMN_TRY(const dds_entity_t made, make_topic(topic, has_transforms));
+  LIMN_TRY(const dds_entity_t made, domain_.topic(topic, type_of(has_transforms)));
   const Qos qos = ros_writer_qos(has_transforms);
-  const dds_entity_t writer = dds_create_writer(participant_, made, qos.get(), nullptr);
-  if (writer < 0) return failed("topic " + topic, writer);
+  const dds_entity_t writer = dds_create_writer(domain_.participant(), made, qos.get(), nullptr);
+  if (writer < 0) return ros_failed("topic " + topic, writer);
+  entities_.push_back(writer);
   writers_[topic] = writer;
   return writer;
 }
@@ -232,7 +200,7 @@ Status DdsRosPort::publish_pose(const std::string& topic, const RosPose& pose) {
   LIMN_TRY(const dds_entity_t writer, writer_of(topic, false));
   const PoseStamped sample = pose_sample(pose);
   const dds_return_t code = dds_write(writer, &sample);
-  if (code < 0 && code != DDS_RETCODE_TIMEOUT) return failed("topic " + topic, code);
+  if (code < 0 && code != DDS_RETCODE_TIMEOUT) return ros_failed("topic " + topic, code);
   return {};
 }
 
@@ -243,7 +211,7 @@ Status DdsRosPort::publish_transforms(const std::string& topic, std::span<const 
   const auto count = static_cast<std::uint32_t>(transforms.size());
   const TransformMessage sample{{count, count, transforms.data(), false}};
   const dds_return_t code = dds_write(writer, &sample);
-  if (code < 0 && code != DDS_RETCODE_TIMEOUT) return failed("topic " + topic, code);
+  if (code < 0 && code != DDS_RETCODE_TIMEOUT) return ros_failed("topic " + topic, code);
   return {};
 }
 

@@ -1,9 +1,16 @@
 // A program that takes part in ROS 2 as far as its middleware is concerned, for tests: ros_peer DOMAIN
-// publish|listen. It uses Cyclone DDS alone, prints "ready", and leaves when its input ends.
+// publish|images|hd|listen. It uses Cyclone DDS alone, prints "ready", and leaves when its input ends.
 //
 //   publish   each 20 ms: PoseStamped on /mocap/wand (best effort), /mocap/nan (every second one with a NaN)
 //   and
 //             /mocap/lost (its frame changes), and a TFMessage on /tf
+//   images    each 20 ms, with the stamp of the present: an Image of 64 x 48 on /camera/image_raw (rgb8, rows
+//   of
+//             200 bytes, best effort) and on /camera/grey (mono8, reliable, stamp 0), a CompressedImage on
+//             /camera/image_raw/compressed (the bytes of the file that JPEG names, see the environment), an
+//             Image of an encoding that nobody knows on /camera/odd, one that becomes smaller on
+//             /camera/shrinking
+//   hd        30 times a second an Image of 1920 x 1080, rgb8, on /camera/image_raw
 //   listen    prints each writer of topics that begin with rt/: "writer TOPIC TYPE RELIABILITY DURABILITY";
 //   the bytes of
 //             each PoseStamped on /limn/poses/badge: "cdr HEX"; each transform of /tf: "tf FRAME CHILD X Y Z
@@ -18,11 +25,14 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <iterator>
 #include <limits>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "ros_images.h"
 #include "ros_poses.h"
 
 namespace {
@@ -93,6 +103,81 @@ void publish(dds_entity_t participant) {
     dds_write(lost, &astray);
     dds_write(transforms, &message);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+using Image = sensor_msgs_msg_dds__Image_;
+using CompressedImage = sensor_msgs_msg_dds__CompressedImage_;
+const dds_topic_descriptor_t* const k_image = &sensor_msgs_msg_dds__Image__desc;
+const dds_topic_descriptor_t* const k_compressed = &sensor_msgs_msg_dds__CompressedImage__desc;
+
+std_msgs_msg_dds__Header_ header_now() {
+  const auto ns = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                      std::chrono::system_clock::now().time_since_epoch())
+                      .count();
+  static char frame[] = "camera";
+  return {{static_cast<std::int32_t>(ns / 1'000'000'000), static_cast<std::uint32_t>(ns % 1'000'000'000)},
+          frame};
+}
+
+// The bytes that tests/nodes/ros_camera_test.cpp expects.
+void fill(std::vector<std::uint8_t>* bytes) {
+  for (std::size_t i = 0; i < bytes->size(); ++i) (*bytes)[i] = static_cast<std::uint8_t>(i * 7 + i / 200);
+}
+
+Image image_of(const char* encoding,
+               std::uint32_t width,
+               std::uint32_t height,
+               std::uint32_t step,
+               std::vector<std::uint8_t>* bytes) {
+  const auto size = static_cast<std::uint32_t>(bytes->size());
+  return {
+      header_now(), height, width, const_cast<char*>(encoding), 0, step, {size, size, bytes->data(), false}};
+}
+
+void publish_images(dds_entity_t participant) {
+  const dds_entity_t raw = writer(participant, "rt/camera/image_raw", k_image, DDS_RELIABILITY_BEST_EFFORT);
+  const dds_entity_t grey = writer(participant, "rt/camera/grey", k_image, DDS_RELIABILITY_RELIABLE);
+  const dds_entity_t odd = writer(participant, "rt/camera/odd", k_image, DDS_RELIABILITY_RELIABLE);
+  const dds_entity_t shrinking =
+      writer(participant, "rt/camera/shrinking", k_image, DDS_RELIABILITY_RELIABLE);
+  const dds_entity_t compressed =
+      writer(participant, "rt/camera/image_raw/compressed", k_compressed, DDS_RELIABILITY_BEST_EFFORT);
+  const dds_entity_t pose = writer(participant, "rt/camera/pose", k_pose, DDS_RELIABILITY_RELIABLE);
+  const char* path = std::getenv("JPEG");
+  std::ifstream file(path ? path : "", std::ios::binary);
+  std::vector<std::uint8_t> jpeg{std::istreambuf_iterator<char>(file), {}};
+  std::vector<std::uint8_t> bytes(std::size_t{200} * 48);
+  fill(&bytes);
+  static char format[] = "rgb8; jpeg compressed bgr8";
+  for (int i = 0; !input_has_ended(); ++i) {
+    const Image colours = image_of("rgb8", 64, 48, 200, &bytes);
+    Image levels = image_of("mono8", 64, 48, 200, &bytes);
+    levels.header.stamp = {0, 0};
+    const Image unknown = image_of("hyperspectral8", 64, 48, 200, &bytes);
+    const Image smaller = image_of("mono8", i < 50 ? 64 : 32, 48, 200, &bytes);
+    const auto size = static_cast<std::uint32_t>(jpeg.size());
+    const CompressedImage stored{header_now(), format, {size, size, jpeg.data(), false}};
+    const PoseStamped place = pose_of(i, "map", 1);
+    dds_write(raw, &colours);
+    dds_write(grey, &levels);
+    dds_write(odd, &unknown);
+    dds_write(shrinking, &smaller);
+    dds_write(compressed, &stored);
+    dds_write(pose, &place);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+void publish_hd(dds_entity_t participant) {
+  const dds_entity_t raw = writer(participant, "rt/camera/image_raw", k_image, DDS_RELIABILITY_BEST_EFFORT);
+  std::vector<std::uint8_t> bytes(std::size_t{1920} * 3 * 1080);
+  fill(&bytes);
+  for (auto due = std::chrono::steady_clock::now(); !input_has_ended();
+       due += std::chrono::microseconds(33'333)) {
+    const Image image = image_of("rgb8", 1920, 1080, 5760, &bytes);
+    dds_write(raw, &image);
+    std::this_thread::sleep_until(due);
   }
 }
 
@@ -171,8 +256,13 @@ int main(int count, char** words) {
   const dds_entity_t participant = made(dds_create_participant(domain, nullptr, nullptr));
   std::puts("ready");
   std::fflush(stdout);
-  if (std::string(words[2]) == "publish")
+  const std::string what = words[2];
+  if (what == "publish")
     publish(participant);
+  else if (what == "images")
+    publish_images(participant);
+  else if (what == "hd")
+    publish_hd(participant);
   else
     listen(participant);
 }
