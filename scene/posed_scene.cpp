@@ -22,6 +22,8 @@ const Track* find_track(std::span<const Track> tracks, const std::string& body) 
 // Errors that the corners' covariance does not contain: the distance of the mesh, the calibration and a
 // marker's paper from the true surface. It also keeps a covariance invertible that is zero along some line.
 constexpr double k_unknown_place = 0.2e-3;  // m
+// A marker that is less certain than this, after it was not seen for long, is laid on the nearest place.
+constexpr double k_most_unknown_place = 1;  // m
 
 // Covariance of the marker's centre in the prototype's frame, from the covariances of both poses.
 Eigen::Matrix3d place_covariance(const Track& prototype, const Track& marker) {
@@ -45,8 +47,10 @@ Eigen::Matrix3d place_covariance(const Track& prototype, const Track& marker) {
 // the side of the surface, so that a mesh with inverted normals works, too.
 Pose laid_on(const Mesh& mesh, const Track& prototype, const Track& marker) {
   const Pose prototype_from_marker = prototype.world_from_body.inverse() * marker.world_from_body;
-  const MeshPoint point =
-      most_likely_on(mesh, prototype_from_marker.translation, place_covariance(prototype, marker));
+  const Eigen::Matrix3d covariance = place_covariance(prototype, marker);
+  const bool is_known = covariance.trace() < k_most_unknown_place * k_most_unknown_place;
+  const MeshPoint point = is_known ? most_likely_on(mesh, prototype_from_marker.translation, covariance)
+                                   : nearest_on(mesh, prototype_from_marker.translation);
   const Eigen::Vector3d d_marker_z = prototype_from_marker.rotation * Eigen::Vector3d::UnitZ();
   const Eigen::Vector3d d_inward = d_marker_z.dot(point.d_normal) > 0 ? point.d_normal : -point.d_normal;
   const Eigen::Quaterniond turn = rotation_between(d_marker_z, d_inward);

@@ -108,9 +108,11 @@ class NodeTest : public ::testing::Test {
   std::uint64_t send_frame() {
     const int camera = 0;
     const session::Percepts& percepts = perception_->watch(rig_.expose(std::span(&camera, 1)));
-    const session::FrameTimes times{rig_.now(), shifted(now(), 0.02)};
+    const session::FrameTimes times{rig_.now(), shifted(rig_.now(), 0.02)};
     const auto input = session::frame_input(setup_.scene, {}, percepts, show_state(), times);
-    client_->note_description(composer_->describe(input));
+    session::FrameDescription frame = composer_->describe(input);
+    frame.shown_at = shifted(now(), 0.02);  // nodes have this machine's clock, not the virtual rig's
+    client_->note_description(frame);
     const std::array<cv::Mat, 2> eyes = {composer_->draw().projectors[1], cv::Mat()};
     return session::fingerprint(eyes);
   }

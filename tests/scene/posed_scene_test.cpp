@@ -72,6 +72,19 @@ TEST(Posed, LostPartIsAbsentAndAnExtrapolatedOneIsNot) {
   EXPECT_EQ(out.parts[0].slot, "trim");
 }
 
+TEST(Posed, StickingPartThatWasNotSeenForHoursIsLaidOnTheNearestPlace) {
+  const Scene scene = two_slots(true);
+  std::array<Track, 2> tracks = {track_of("prototype", Pose{}),
+                                 track_of("mirror", Pose(Eigen::Quaterniond::Identity(), {0, 0.1, -0.6}))};
+  // Not positive definite in floating point once it is turned and the place's own error is added.
+  const Vector3d d = Vector3d(1, 2, 3).normalized();
+  tracks[1].covariance.bottomRightCorner<3, 3>() = 1e30 * d * d.transpose();
+  const PosedScene out = posed(scene, tracks);
+  ASSERT_EQ(out.parts.size(), 1u);
+  const Pose world_from_marker = out.parts[0].world_from_part * scene.slots[0].marker_from_part.inverse();
+  EXPECT_LT((world_from_marker.translation - Vector3d(0, 0.1, -0.5)).norm(), 1e-6);
+}
+
 TEST(Posed, StickingPartIsLaidOntoTheSurfaceAndKeepsItsTurn) {
   Scene scene = two_slots(true);
   const Pose world_from_prototype(exp_rotation({0.3, 1.2, -0.4}), {0.5, -0.2, 2});
