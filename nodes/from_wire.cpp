@@ -92,7 +92,10 @@ Track WireReading::track(const limn_v1_Track& in) {
   Track out;
   out.body = text(in.body);
   out.world_from_body = pose(in.world_from_body);
-  out.covariance = Matrix6d(in.covariance);
+  const double* next = in.covariance;
+  for (Eigen::Index row = 0; row < 6; ++row)
+    for (Eigen::Index column = 0; column <= row; ++column)
+      out.covariance(row, column) = out.covariance(column, row) = *next++;
   out.marker_count = in.marker_count;
   out.rms_px = in.rms_px;
   out.captured_at = stamp(in.captured_at);

@@ -132,7 +132,9 @@ void WireFilling::imager(const Imager& in, limn_v1_Imager* out) {
 void WireFilling::track(const Track& in, limn_v1_Track* out) {
   text(in.body, &out->body);
   pose(in.world_from_body, &out->world_from_body);
-  std::copy_n(in.covariance.data(), 36, out->covariance);
+  double* next = out->covariance;
+  for (Eigen::Index row = 0; row < 6; ++row)
+    for (Eigen::Index column = 0; column <= row; ++column) *next++ = in.covariance(row, column);
   out->marker_count = in.marker_count;
   out->rms_px = in.rms_px;
   out->captured_at = nanoseconds_of(in.captured_at);

@@ -68,7 +68,8 @@ std::vector<Track> predicted(std::span<const BodyFilter> known,
     Track track;
     track.body = motion.body;
     track.world_from_body = now.world_from_body;
-    track.covariance = now.covariance;
+    // Symmetric to the last bit, so that half of it can be sent (nodes/).
+    track.covariance = now.covariance.selfadjointView<Eigen::Lower>();
     track.marker_count = motion.marker_count;
     track.rms_px = motion.rms_px;
     track.captured_at = motion.measured_at;

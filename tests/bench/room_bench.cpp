@@ -170,11 +170,12 @@ Status measure(const fs::path& room, const BenchOptions& options) {
     received += count;
     least = std::min(least, count);
   }
-  fmt::print("{:5} {:10} {:8.1f} {:10.1f} {:9.0f} {:9.2f} {:9.1f} {:8.2f} {:8.2f} {:9.3f} {:9.3f} {:6}\n",
-             options.nodes, options.nodes * options.projectors, found_s, 100 * processor / took_s,
-             memory_mb(), (bytes - bytes_before) / took_s / 1e6, (packets - packets_before) / took_s,
-             quantile(delays, 0.5), quantile(delays, 0.99), received / options.nodes / frames, least / frames,
-             late);
+  fmt::print(
+      "{:5} {:10} {:8.1f} {:10.1f} {:9.0f} {:9.2f} {:9.1f} {:9.1f} {:8.2f} {:8.2f} {:9.3f} {:9.3f} {:6}\n",
+      options.nodes, options.nodes * options.projectors, found_s, 100 * processor / took_s, memory_mb(),
+      (bytes - bytes_before) / took_s / 1e6, (bytes - bytes_before) / frames / 1e3,
+      (packets - packets_before) / took_s, quantile(delays, 0.5), quantile(delays, 0.99),
+      received / options.nodes / frames, least / frames, late);
   return {};
 }
 
@@ -193,7 +194,8 @@ int run(int argc, char** argv) {
       "                        host's     host's   network   network   delay of a moment   moments "
       "received\n");
   fmt::print(
-      "nodes projectors  found s  CPU %  memory MB      MB/s  packets/s  median ms   99 % ms  mean share  "
+      "nodes projectors  found s  CPU %  memory MB      MB/s  kB/frame  packets/s  median ms   99 % ms  mean "
+      "share  "
       "least  late\n");
   for (const int count : nodes) {
     options.nodes = count;

@@ -40,6 +40,7 @@ template <class F>
 void fields(F& f, Track& x) {
   f(x.body), f(x.world_from_body), f(x.covariance), f(x.marker_count), f(x.rms_px), f(x.captured_at), f(x.at),
       f.one_of(x.tracking, 3);
+  x.covariance = Matrix6d(x.covariance.selfadjointView<Eigen::Lower>());  // half of it is sent
 }
 template <class F>
 void fields(F& f, scene::MaterialOverride& x) {

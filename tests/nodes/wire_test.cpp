@@ -65,7 +65,7 @@ TEST(Wire, HostileMomentsAreRefused) {
                  [=](auto* wire) { wire->tracks._buffer[0].world_from_body.translation[1] = k_nan; });
   expect_refused("track:", [](auto* wire) { wire->tracks._buffer[0].world_from_body.rotation[0] = 0; });
   expect_refused("track.covariance",
-                 [=](auto* wire) { wire->tracks._buffer[0].covariance[35] = k_infinity; });
+                 [=](auto* wire) { wire->tracks._buffer[0].covariance[20] = k_infinity; });
   expect_refused("track.body", [&](auto* wire) { wire->tracks._buffer[0].body = long_name.data(); });
   expect_refused("viewer.size", [](auto* wire) { wire->viewer.size.width = -1; });
   expect_refused("viewer.size", [](auto* wire) { wire->viewer.size.height = 1 << 20; });
