@@ -79,7 +79,9 @@ std::string to_text(const DisplayConfig& config) {
   return config.kind == DisplayKind::monitor ? config.monitor : k_display_kinds.text(config.kind);
 }
 
-bool needs_desktop(const DisplayConfig& config) { return config.kind != DisplayKind::offscreen; }
+bool needs_desktop(const DisplayConfig& config) {
+  return config.host.empty() && config.kind != DisplayKind::offscreen;
+}
 
 Result<std::unique_ptr<Display>> open_display(const DisplayConfig& config, const Desktop* desktop) {
   LIMN_TRY(std::unique_ptr<Display> display, open_surface(config, desktop));

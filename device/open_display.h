@@ -35,7 +35,7 @@ struct DisplayConfig {
 
 /// What shows the display's images, as a devices file writes it: the monitor's name, `window` or `offscreen`.
 std::string to_text(const DisplayConfig& config);
-/// Whether the display needs a desktop.
+/// Whether the display needs this machine's desktop.
 bool needs_desktop(const DisplayConfig& config);
 
 /// Opens the display; `desktop` may be null for an offscreen one. Errors: no desktop, no such monitor, a

@@ -38,6 +38,7 @@ TEST(OpenDisplay, WithoutADesktopOrASizeTheErrorSaysSo) {
   EXPECT_TRUE(needs_desktop({.monitor = "HDMI-1"}));
   EXPECT_TRUE(needs_desktop({.kind = DisplayKind::window}));
   EXPECT_FALSE(needs_desktop({.kind = DisplayKind::offscreen}));
+  EXPECT_FALSE(needs_desktop({.host = "left", .monitor = "HDMI-1"}));
   for (const DisplayConfig& config :
        {DisplayConfig{.name = "left", .monitor = "HDMI-1", .size = {8, 6}},
         DisplayConfig{.name = "left", .kind = DisplayKind::window, .size = {8, 6}}}) {
