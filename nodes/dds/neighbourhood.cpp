@@ -56,14 +56,18 @@ NeighbourState Neighbourhood::state() {
   constexpr double k_longest_entry_s =
       5;  // a program with keys is connected by then, even if datagrams are lost
   const std::vector<dds_instance_handle_t> writers = matched_writers(offers_);
-  std::set<dds_instance_handle_t> unknown = found_participants();
-  for (const dds_instance_handle_t participant : connected_participants()) unknown.erase(participant);
+  std::set<dds_instance_handle_t> unknown = found_participants(), entered = connected_participants();
   const Stamp at = now();
   const auto since = [at](const auto& before, dds_instance_handle_t handle) {
     const auto found = before.find(handle);
     return found == before.end() ? at : found->second;
   };
   const std::lock_guard lock(mutex_);
+  // One that was connected and left is remembered for a while, and is no stranger.
+  for (const dds_instance_handle_t participant : entered_)
+    if (unknown.contains(participant)) entered.insert(participant);
+  for (const dds_instance_handle_t participant : entered) unknown.erase(participant);
+  entered_ = std::move(entered);
   NeighbourState out;
   std::map<dds_instance_handle_t, Stamp> met, strangers;
   for (const dds_instance_handle_t writer : writers) {

@@ -32,6 +32,7 @@ class Neighbourhood {
   std::mutex mutex_;
   std::map<dds_instance_handle_t, Stamp> met_;        // when each connected writer of offers wrote last
   std::map<dds_instance_handle_t, Stamp> strangers_;  // participants that are not connected, since when
+  std::set<dds_instance_handle_t> entered_;           // programs that were connected since they were found
 };
 
 }  // namespace limn::nodes
