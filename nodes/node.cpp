@@ -155,7 +155,8 @@ class NodeLoop {
   }
 
   void report() {
-    if (seconds_between(reported_at_, now()) < k_health_every_s) return;
+    const double reported_s = seconds_between(reported_at_, now());  // ago; negative: the clock has stepped
+    if (reported_s >= 0 && reported_s < k_health_every_s) return;
     reported_at_ = now();
     Health health;
     if (const auto clock = room_->host_clock()) {

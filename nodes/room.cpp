@@ -40,9 +40,8 @@ void Room::compare_clocks() {
   {
     const std::lock_guard lock(mutex_);
     const auto host = std::ranges::find_if(machines_, [](const auto& m) { return m.second.offer.is_host; });
-    if (is_host_ || host == machines_.end() ||
-        seconds_between(asked_clock_at_, now()) < clock_.wanted_interval_s())
-      return;
+    const double asked_s = seconds_between(asked_clock_at_, now());  // ago; negative: the clock has stepped
+    if (is_host_ || host == machines_.end() || (asked_s >= 0 && asked_s < clock_.wanted_interval_s())) return;
     asked_clock_at_ = now();
     request = {host->first, ++clock_requests_, now()};
   }
