@@ -63,10 +63,10 @@ Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) 
     if (!display)
       return error("{}: expected a working projector, found none. Check its cable and its power.",
                    projector_names_[i]);
-    const Stamp begun = now();
     LIMN_TRY(const Stamp shown_at,
              display->show(i == projector ? image : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
-    on_surface_at_ = std::max({on_surface_at_, shown_at, shifted(begun, latency_s_[i])});
+    // As it was measured. A display with a latency in the devices file is waited for longer than necessary.
+    on_surface_at_ = std::max(on_surface_at_, shifted(shown_at, latency_s_[i]));
   }
   return {};
 }
