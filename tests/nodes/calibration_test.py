@@ -3,7 +3,7 @@
     calibration_test.py LIMN ROOM_WORLD SOURCE FOLDER [--one-machine]
 
 The projector is the screen of an X server at `left`; room_world shows what the camera at `right` sees of its light.
-The rig is compared with the true one. With --one-machine all of it is at the host, without a room. Needs root.
+The rig is compared with the true one. Then the projector is nudged during a session and the rig repaired. With --one-machine all of it is at the host, without a room. Needs root.
 Exit code 77: namespaces or Xvfb are not there.
 """
 
@@ -12,13 +12,14 @@ import math
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 import time
 from pathlib import Path
 
-from machines import Machines, Network, run, wait_for
+from machines import Machines, Network, rows_in, run, send_osc, wait_for
 
 NODES = ["left", "right"]
 PORT = 8090
@@ -92,6 +93,17 @@ def projector_in_camera(rig):
     return [sum(row[i] * away[i] for i in range(3)) for row in matrix(camera["imager_from_world"])]
 
 
+def direction_in_camera(rig):
+    """Where the projector's optical axis points, in the camera's frame."""
+    d_world = matrix(rig["projectors"][0]["imager_from_world"])[2]
+    return [sum(a * b for a, b in zip(row, d_world)) for row in matrix(rig["cameras"][0]["imager_from_world"])]
+
+
+def degrees_apart(folder, truth):
+    one, other = (direction_in_camera(json.loads((at / "rig.json").read_text())) for at in (folder, truth))
+    return math.degrees(math.asin(min(1.0, math.dist(one, other) / 2)) * 2)
+
+
 def report_errors(folder, truth):
     rig, true = json.loads((folder / "rig.json").read_text()), json.loads((truth / "rig.json").read_text())
     moved_mm = 1e3 * math.dist(projector_in_camera(rig), projector_in_camera(true))
@@ -119,8 +131,8 @@ def calibrate(machines, source, room_world, is_one_machine):
     if is_one_machine:
         command = ["env", f"DISPLAY={display}", *command]
     else:
-        machines.start("left", ["env", f"DISPLAY={display}", machines.limn, "node", "--join", "studio", "--name", "left"],
-                       100)
+        machines.start("left", ["env", f"DISPLAY={display}", machines.limn, "node", "--join", "studio", "--name", "left",
+                                "--out", folder / "left-0"], 100)
         machines.start_node("right", clock_ahead_s=200)
         wait_for(20, lambda: "waits for a host" in (folder / "left.log").read_text(), "the node begins")
         wait_for(20, lambda: "waits for a host" in (folder / "right.log").read_text(), "the node begins")
@@ -144,6 +156,37 @@ def calibrate(machines, source, room_world, is_one_machine):
     moved_mm, focal, report = report_errors(folder / "rig", folder / "truth")
     assert moved_mm < 1.5 and max(focal.values()) < 1.5e-3, "the rig is not the true one"
     assert report["verdict"] == "good" and report["held_out"]["rms_px"] < 0.1, report["held_out"]
+    return world
+
+
+def repair(machines, source, world):
+    """A projector at a node is nudged during a session; the host's repair finds how."""
+    folder = machines.folder
+    world.do("prototype")
+    host = machines.start("host", [machines.limn, "live", "--room", "studio", "--name", "host", "--devices",
+                                   folder / "devices.json", "--rig", folder / "rig", "--scene",
+                                   source / "config/scenes/door", "--osc", "9000", "--out", folder / "live"])
+    log, images = folder / "host.log", folder / "left-0/shown.csv"
+    wait_for(60, lambda: rows_in(images) > 30, "the node shows images")
+    world.do("board 5")  # one camera and one projector can be told apart by it only
+    world.do("nudge projector0 0 0.4 0")
+    before = degrees_apart(folder / "rig", folder / "truth")
+    begun = time.monotonic()
+    send_osc(machines, "host", "/limn/repair")
+    wait_for(150, lambda: "live: repair:" in log.read_text(), "the repair ends")
+    seconds = time.monotonic() - begun
+    rows = rows_in(images)
+    wait_for(20, lambda: rows_in(images) > rows + 20, "the node shows images again")
+    host.send_signal(signal.SIGTERM)
+    assert host.wait(20) == 0, "the host failed"
+    sentence = next(line for line in log.read_text().splitlines() if "live: repair:" in line)
+    print(sentence)
+    after = degrees_apart(folder / "live/repaired-1", folder / "truth")
+    print(f"the projector's axis was {before:.3f} degrees from the true one before the repair, {after:.3f} after it, "
+          f"in {seconds:.0f} s")
+    strangers = [name for name in NODES if "other keys" in (folder / f"{name}.log").read_text()]
+    assert not strangers, f"{strangers}: took a host that had left for a stranger"
+    assert "projector0" in sentence and before > 0.3 and after < 0.1, sentence
 
 
 def main():
@@ -158,7 +201,10 @@ def main():
     machines = Machines(limn, folder, network)
     try:
         subprocess.run([limn, "room", "create", "studio"], check=True, env=machines.environment, capture_output=True)
-        calibrate(machines, source, room_world, "--one-machine" in sys.argv)
+        is_one_machine = "--one-machine" in sys.argv
+        world = calibrate(machines, source, room_world, is_one_machine)
+        if not is_one_machine:
+            repair(machines, source, world)
     finally:
         for program in machines.programs:
             program.kill()

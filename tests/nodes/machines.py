@@ -12,6 +12,7 @@ import select
 import signal
 import struct
 import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -236,3 +237,14 @@ def wait_for(limit_s, condition, what):
 
 def rows_in(path):
     return path.read_text().count("\n") - 1 if path.exists() else 0
+
+
+def send_osc(machines, name, address, argument=""):
+    """Sends an OSC message to port 9000 from within a machine; returns the moment (time.monotonic_ns())."""
+    def padded(text):
+        return text.encode() + bytes(4 - len(text) % 4)
+
+    message = padded(address) + (padded(",s") + padded(argument) if argument else padded(","))
+    program = (f"import socket, time; s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); print(time.monotonic_ns()); "
+               f"s.sendto({message!r}, ('127.0.0.1', 9000))")
+    return int(run(*machines.network.command(name, [sys.executable, "-c", program])).stdout)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import failures
 from machines import (NODES, PREFIX, LossyNetwork, Machines, Network, NetworkOfVersion6, NetworkWithoutMulticast,
-                      fingerprints, prepare, rows_in, run, shown, wait_for)
+                      fingerprints, prepare, rows_in, run, send_osc, shown, wait_for)
 
 
 def images_are_the_hosts(machines):
@@ -83,6 +83,33 @@ machines_meet_without_multicast.network = NetworkWithoutMulticast
 machines_meet_by_ipv6.network = NetworkOfVersion6
 
 
+def a_blackout_reaches_all_and_one_recording_replays_the_room(machines):
+    """Black within 100 ms at all nodes; the host's recording replays on one machine, to the bit."""
+    for node in NODES:
+        machines.start_node(node)
+    recording = machines.folder / "of-the-room"
+    host = machines.start_host(0, extra=["--osc", "9000", "--record", recording])
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    wait_for(60, lambda: all(rows_in(path) > 60 for path in paths), "the nodes show images")
+    sent_ns = send_osc(machines, "host", "/limn/blackout", "on")
+    time.sleep(1.5)
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    black_s = {}
+    for node, path in zip(NODES, paths):
+        rows = shown(path)
+        black = rows[-1]["fingerprint"]
+        first = next(row for row in rows if row["fingerprint"] == black)
+        assert all(row["fingerprint"] == black for row in rows[rows.index(first):]) and rows.index(first) > 50
+        black_s[f"black at {node} after, s"] = (int(first["shown_at_ns"]) - sent_ns) / 1e9
+    replayed = subprocess.run([machines.limn, "replay", recording], env=machines.environment, capture_output=True,
+                              text=True)
+    assert replayed.returncode == 0 and "identical to the recorded ones" in replayed.stderr, replayed.stderr
+    equal = failures.compared(machines, paths)
+    assert max(black_s.values()) < 0.3, black_s
+    return {**black_s, **equal}
+
+
 def a_second_host_is_refused(machines):
     machines.start_host(12)
     time.sleep(4)
@@ -95,7 +122,8 @@ def a_second_host_is_refused(machines):
 
 
 SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_meet_without_multicast,
-             machines_meet_by_ipv6, *failures.SCENARIOS, a_second_host_is_refused]
+             machines_meet_by_ipv6, *failures.SCENARIOS,
+             a_blackout_reaches_all_and_one_recording_replays_the_room, a_second_host_is_refused]
 
 
 def run_once(scenario, run_number, arguments):

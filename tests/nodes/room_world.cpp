@@ -16,6 +16,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
@@ -130,6 +131,7 @@ void obey(const std::string& line, const wizard::Plan& plan, sim::VirtualRig* ri
       if (projector.name == name)
         projector.imager_from_world =
             Pose(exp_rotation(degrees * std::numbers::pi / 180), {0, 0, 0}) * projector.imager_from_world;
+    LIMN_CHECK(save_rig(rig->world().rig, plan.world.parent_path() / "truth").ok());
   }
   std::printf("did %s\n", line.c_str());
   std::fflush(stdout);
@@ -148,6 +150,17 @@ bool obey_input(const wizard::Plan& plan, sim::VirtualRig* rig) {
 
 bool is_equal(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF) == 0; }
 
+// What a screen shows when it is not just changing.
+cv::Mat settled_image(const Screen& screen) {
+  cv::Mat image = screen.image();
+  while (true) {
+    std::this_thread::sleep_for(k_settling);
+    const cv::Mat again = screen.image();
+    if (is_equal(image, again)) return image;
+    image = again;
+  }
+}
+
 int run(const wizard::Plan& plan, int port, const std::vector<Screen>& screens) {
   sim::VirtualRig rig(sim::load_world(plan.world, tracker::marker_image).value(),
                       {.display_delay_s = 0, .camera_delay_s = 0, .grab_waits_for_light = false});
@@ -156,21 +169,21 @@ int run(const wizard::Plan& plan, int port, const std::vector<Screen>& screens) 
   obey("board 0", plan, &rig);
   LIMN_CHECK(save_rig(rig.world().rig, plan.world.parent_path() / "truth").ok());
   Server server(port);
+  std::vector<cv::Mat> shown(screens.size());
   for (Stamp next = now(); obey_input(plan, &rig); next = std::max(next + k_frame, now())) {
     std::this_thread::sleep_until(next);
     for (std::size_t i = 0; i < screens.size(); ++i) {
-      cv::Mat image = screens[i].image(), again;
-      while (true) {
-        std::this_thread::sleep_for(k_settling);
-        again = screens[i].image();
-        if (is_equal(image, again)) break;
-        image = again;
-      }
-      LIMN_CHECK(rig.projector(static_cast<int>(i)).show(image).ok());
+      shown[i] = settled_image(screens[i]);
+      LIMN_CHECK(rig.projector(static_cast<int>(i)).show(shown[i]).ok());
     }
     const cv::Mat seen = rig.camera(0).next()->image;
     const std::vector<std::uint8_t> jpeg = device::encode_jpeg(seen, k_jpeg_quality);
-    server.send_image({jpeg.begin(), jpeg.end()});
+    // An image counts as exposed when it arrives. One that has become wrong while it was computed is left
+    // out.
+    const bool is_true = std::equal(
+        screens.begin(), screens.end(), shown.begin(),
+        [](const Screen& screen, const cv::Mat& image) { return is_equal(screen.image(), image); });
+    if (is_true) server.send_image({jpeg.begin(), jpeg.end()});
   }
   return 0;
 }
