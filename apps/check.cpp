@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "core/data_folder.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/json_text.h"
@@ -25,9 +26,10 @@ namespace {
 namespace fs = std::filesystem;
 
 Result<std::vector<fs::path>> shipped_checks() {
-  const fs::path folder = fs::path(LIMN_SOURCE_DIR) / "config/checks";
+  LIMN_TRY(const fs::path folder, data_file("config/checks"));
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder))
+  std::error_code none;
+  for (const auto& entry : fs::directory_iterator(folder, none))
     if (entry.path().extension() == ".json") files.push_back(entry.path());
   if (files.empty()) return error("{}: expected check files, found none.", folder.string());
   std::sort(files.begin(), files.end());

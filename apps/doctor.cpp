@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "apps/doctor_room.h"
+#include "core/data_folder.h"
 #include "core/file.h"
 #include "core/json_text.h"
 #include "core/log.h"
@@ -60,10 +61,18 @@ std::set<std::string> installed_in(const std::string& text) {
   return names;
 }
 
+// An installed program needs no list of packages: its own package named them. Its data may be missing.
+Finding installed_data() {
+  const auto data = data_file("config");
+  if (!data) return failed("packages", "data", data.message());
+  return {"packages", "data", State::works, data->parent_path().string(), ""};
+}
+
 Finding packages(const DoctorOptions& options) {
-  const std::filesystem::path list =
-      options.packages.empty() ? std::filesystem::path(LIMN_SOURCE_DIR) / "packages.txt" : options.packages;
-  const auto wanted = read_file(list);
+  if (options.packages.empty() && !is_development_build()) return installed_data();
+  const auto list =
+      options.packages.empty() ? data_file("packages.txt") : Result<std::filesystem::path>(options.packages);
+  const auto wanted = list ? read_file(*list) : Result<std::string>(list.error());
   const auto status = read_file(options.installed);
   if (!wanted || !status)
     return {"packages", "Debian", State::note,

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 
+#include "core/data_folder.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "core/scale_resolution.h"
@@ -106,8 +107,10 @@ Result<VirtualSetup> load_virtual_setup(const LiveOptions& options) {
     LIMN_TRY(loaded.setup.scene, scene::load_scene(options.scene, &loaded.skipped_variants));
   }
   if (options.rig.empty() || !options.world.empty()) {
-    const fs::path world =
-        options.world.empty() ? fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json" : options.world;
+    fs::path world = options.world;
+    if (world.empty()) {
+      LIMN_TRY(world, data_file("config/worlds/studio.json"));
+    }
     LIMN_TRY(loaded.world, sim::load_world(world, tracker::marker_image, &loaded.skipped_variants));
     if (!loaded.world.scene)
       return error("{}: scene: expected a scene for a session, found none.", world.string());

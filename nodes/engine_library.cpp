@@ -2,9 +2,10 @@
 
 #include <dlfcn.h>
 
-#include <array>
 #include <cstdlib>
 #include <filesystem>
+
+#include "core/data_folder.h"
 
 namespace limn::nodes {
 namespace {
@@ -15,11 +16,7 @@ constexpr const char *k_library = "liblimn_room_dds.so", *k_variable = "LIMN_ROO
 
 fs::path engine_path() {
   if (const char* chosen = std::getenv(k_variable); chosen && *chosen) return chosen;
-  std::error_code ignored;
-  const fs::path program = fs::read_symlink("/proc/self/exe", ignored).parent_path();
-  for (const fs::path& folder : {program, program.parent_path() / "lib" / "limn"})
-    if (fs::exists(folder / k_library, ignored)) return folder / k_library;
-  return fs::path(LIMN_ENGINE_FOLDER) / k_library;
+  return private_library(k_library);
 }
 
 }  // namespace
@@ -32,9 +29,8 @@ Result<void*> engine_function(const char* name) {
   if (function) return function;
   const char* why = ::dlerror();
   return error(
-      "{}: expected the engine that connects the machines of a room and ROS 2, found: {}. Install the "
-      "package "
-      "cyclonedds-dev and build Limn again, or name the file in {}.",
+      "{}: expected the engine that connects the machines of a room and ROS 2, found: {}. Install Limn again "
+      "(a build needs the package cyclonedds-dev), or name the file in {}.",
       path.string(), why ? why : "nothing", k_variable);
 }
 

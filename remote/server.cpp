@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/data_folder.h"
 #include "core/log.h"
 #include "core/user_folder.h"
 #include "device/udp_socket.h"
@@ -93,8 +94,11 @@ Result<std::unique_ptr<Server>> Server::open(const ServeOptions& options, ImageP
   };
   const auto place = device::net_place(options.at, "127.0.0.1", true);
   if (!place) return named(place.error());
-  auto files =
-      StaticFiles::read(options.page.empty() ? fs::path(LIMN_SOURCE_DIR) / "remote/web" : options.page);
+  fs::path page = options.page;
+  if (page.empty()) {
+    LIMN_TRY(page, data_file("remote/web"));
+  }
+  auto files = StaticFiles::read(page);
   if (!files) return named(files.error());
   const auto certificate = certificate_for(options, place->host);
   if (!certificate) return named(certificate.error());

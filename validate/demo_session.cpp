@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
+#include "core/data_folder.h"
 #include "core/image_io.h"
 #include "core/json_text.h"
 #include "core/log.h"
@@ -253,8 +254,8 @@ Result<DemoSession> calibrate(const fs::path& out,
   const fs::path captures = out / "demo-captures", rig_folder = out / "rig";
   std::error_code ignored;
   fs::remove_all(captures, ignored);
-  LIMN_TRY(const wizard::Plan plan,
-           wizard::load_plan(fs::path(LIMN_SOURCE_DIR) / "config/plans/studio.json"));
+  LIMN_TRY(const fs::path plan_file, data_file("config/plans/studio.json"));
+  LIMN_TRY(const wizard::Plan plan, wizard::load_plan(plan_file));
   LIMN_TRY_STATUS(phases->time("capture", [&] { return wizard::capture_virtually(plan, room, captures); }));
   wizard::SolveCommandOptions solving;
   solving.captures = captures;
@@ -420,8 +421,8 @@ double mask_iou(DemoSession* session,
 }  // namespace
 
 Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
-  LIMN_TRY(sim::World world,
-           sim::load_world(fs::path(LIMN_SOURCE_DIR) / "config/worlds/studio.json", tracker::marker_image));
+  LIMN_TRY(const fs::path world_file, data_file("config/worlds/studio.json"));
+  LIMN_TRY(sim::World world, sim::load_world(world_file, tracker::marker_image));
   sim::VirtualRig room(std::move(world));
   PhaseTimes phases;
   LIMN_TRY(DemoSession session, calibrate(out, &room, &phases, keep_captures));

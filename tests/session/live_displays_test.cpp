@@ -59,7 +59,7 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
     devices.screens.push_back(std::move(canvas));
   }
   const std::atomic<bool> is_ended = false;
-  const Status played = play_on_devices(&devices, 1.5, is_ended, {*perception, *session, *output});
+  const Status played = play_on_devices(&devices, 3, is_ended, {*perception, *session, *output});
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
   EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);
@@ -111,7 +111,7 @@ TEST(Live, DisplaysInStereoAndWallsShowWhatEachEyeSees) {
   };
   devices.walls["wall"] = {through(-0.2, -0.15), through(0.2, -0.15), through(-0.2, 0.15)};
   const std::atomic<bool> is_ended = false;
-  const Status played = play_on_devices(&devices, 1.5, is_ended, {*perception, *session, *output});
+  const Status played = play_on_devices(&devices, 3, is_ended, {*perception, *session, *output});
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* canvas : shown) ASSERT_FALSE(canvas->shown.empty()) << canvas->name();
   const cv::Mat light = shown[0]->shown, wall = shown[1]->shown, desk = shown[2]->shown;
