@@ -5,6 +5,7 @@ The host's clock is this test's, so stamps in shown.csv can be compared with tim
 
 import json
 import time
+from pathlib import Path
 
 from machines import NODES, fingerprints, rows_in, shown, wait_for
 
@@ -145,7 +146,8 @@ def a_clock_steps(machines):
     """A node's clocks step by 5 s, forwards and, in every second run, backwards."""
     step_s = -5 if machines.run_number % 2 else 5
     machines.set_clock("left", drift=50e-6)
-    host, _ = begin(machines)
+    host, programs = begin(machines)
+    assert machines.clock_library.name in Path(f"/proc/{programs['left'].pid}/maps").read_text(), "the clock is not ours"
     stepped_ns = time.monotonic_ns()
     machines.set_clock("left", drift=50e-6, step_s=step_s)
     time.sleep(4)
@@ -155,8 +157,7 @@ def a_clock_steps(machines):
     path = machines.folder / "left-0/shown.csv"
     rows = rows_between(path, stepped_ns, end_ns)
     wrong = [row for row in rows if abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) > 1e9]
-    assert wrong, "the clock did not step"
-    right_again_s = (int(wrong[-1]["wanted_at_ns"]) - stepped_ns) / 1e9
+    right_again_s = (int(wrong[-1]["wanted_at_ns"]) - stepped_ns) / 1e9 if wrong else 0.0
     wanted_ns = [int(row["wanted_at_ns"]) for row in rows]
     pause_s = max(after - before for before, after in zip(wanted_ns, wanted_ns[1:])) / 1e9
     assert right_again_s < 2 and pause_s < 1.5, (right_again_s, pause_s)

@@ -4,6 +4,7 @@ import csv
 import ctypes
 import fcntl
 import heapq
+import itertools
 import json
 import mmap
 import os
@@ -205,10 +206,12 @@ def shown(path):
         return list(csv.DictReader(file))
 
 
-def prepare(limn, folder, images=3000):
-    """A recorded session in the studio, whose camera images the host plays again and again, and devices at nodes."""
+def prepare(limn, folder, world="studio", nodes=NODES, images=3000):
+    """A recorded session in a world of config/, whose camera images the host plays again and again, and devices whose
+    projectors are plugged into the nodes in turn."""
     environment = dict(os.environ, HOME=str(folder / "home"), XDG_CONFIG_HOME=str(folder / "config"))
-    subprocess.run([limn, "live", "--resolution", "0.25", "--seconds", "1", "--record", folder / "recording"],
+    path = Path(__file__).resolve().parents[2] / f"config/worlds/{world}.json"
+    subprocess.run([limn, "live", "--world", path, "--resolution", "0.25", "--seconds", "1", "--record", folder / "recording"],
                    check=True, env=environment, capture_output=True)
     recorded = sorted((folder / "recording/frames/camera0").iterdir())
     film = folder / "film"
@@ -221,17 +224,17 @@ def prepare(limn, folder, images=3000):
     rig = json.loads((folder / "recording/rig/rig.json").read_text())
     displays = [{"name": projector["name"], "host": node, "monitor": "offscreen",
                  "size": projector["size"]}
-                for projector, node in zip(rig["projectors"], NODES)]
+                for projector, node in zip(rig["projectors"], itertools.cycle(nodes))]
     devices = {"schema": "limn.devices/1", "cameras": [{"name": "camera0", "source": str(film)}],
                "displays": displays}
     (folder / "devices.json").write_text(json.dumps(devices))
 
 
-def wait_for(limit_s, condition, what):
+def wait_for(limit_s, condition, what, every_s=0.02):
     begun = time.time()
     while not condition():
         assert time.time() - begun < limit_s, f"{what}: not within {limit_s} s"
-        time.sleep(0.02)
+        time.sleep(every_s)
     return time.time() - begun
 
 

@@ -2,7 +2,8 @@
 
     network_test.py LIMN CLOCK_LIBRARY FOLDER [--repeat N] [SCENARIO ...]
 
-With --repeat each scenario runs N times; those of failures.py then print a table of their numbers. Needs root.
+Without a name all scenarios run but those of BY_NAME. With --repeat each runs N times, and those that give numbers
+print a table of them. Needs root.
 Exit code 77: namespaces are not permitted here.
 """
 
@@ -110,6 +111,39 @@ def a_blackout_reaches_all_and_one_recording_replays_the_room(machines):
     return {**black_s, **equal}
 
 
+def a_thousand_frames_of_three_nodes(machines):
+    """Three nodes with four projectors, whose clocks are 100 s apart and drift by 50 ppm against each other."""
+    nodes = machines.nodes
+    for number, (node, drift) in enumerate(zip(nodes, (50e-6, -50e-6, 0)), 1):
+        machines.set_clock(node, drift)
+        machines.start_node(node, clock_ahead_s=100 * number)
+    host = machines.start_host(0)
+    paths = {node: machines.folder / f"{node}-0/shown.csv" for node in nodes}
+
+    def frames(path):
+        return len({row["frame"] for row in shown(path)}) if path.exists() else 0
+
+    wait_for(280, lambda: all(frames(path) >= 1000 for path in paths.values()), "1000 frames at each node", 2)
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    numbers = failures.compared(machines, paths.values())
+    at_ms = {}
+    for node, path in paths.items():
+        rows = shown(path)[20:]
+        late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows)
+        numbers[f"{node}: light from the wanted moment, median, ms"] = late_ms[len(late_ms) // 2]
+        numbers[f"{node}: likewise, 99 %, ms"] = late_ms[int(0.99 * len(late_ms))]
+        for row in rows:
+            at_ms.setdefault(row["frame"], {})[node] = int(row["shown_at_ns"]) / 1e6
+    skews = sorted(max(at.values()) - min(at.values()) for at in at_ms.values() if len(at) == len(nodes))
+    numbers["skew of the three nodes, median, ms"] = skews[len(skews) // 2]
+    return numbers
+
+
+a_thousand_frames_of_three_nodes.world = "quarters"
+a_thousand_frames_of_three_nodes.nodes = ["left", "right", "top"]
+
+
 def a_second_host_is_refused(machines):
     machines.start_host(12)
     time.sleep(4)
@@ -125,17 +159,24 @@ SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_mee
              machines_meet_by_ipv6, *failures.SCENARIOS,
              a_blackout_reaches_all_and_one_recording_replays_the_room, a_second_host_is_refused]
 
+BY_NAME = [a_thousand_frames_of_three_nodes]  # long ones
+
 
 def run_once(scenario, run_number, arguments):
     """Runs a scenario in a new network; returns its numbers, if it has some."""
     place = arguments.folder.resolve() / scenario.__name__
     subprocess.run(["rm", "-rf", place], check=True)
     place.mkdir(parents=True)
-    for path in arguments.prepared.iterdir():
+    nodes, world = getattr(scenario, "nodes", NODES), getattr(scenario, "world", "studio")
+    prepared = arguments.folder.resolve() / f"prepared-{world}"
+    if not prepared.exists():
+        prepared.mkdir()
+        prepare(arguments.limn.resolve(), prepared, world, nodes)
+    for path in prepared.iterdir():
         (place / path.name).symlink_to(path)
-    network = getattr(scenario, "network", Network)(["host", *NODES])
+    network = getattr(scenario, "network", Network)(["host", *nodes])
     machines = Machines(arguments.limn.resolve(), place, network, arguments.clock_library.resolve())
-    machines.run_number = run_number
+    machines.run_number, machines.nodes = run_number, nodes
     try:
         return scenario(machines)
     finally:
@@ -156,13 +197,10 @@ def main():
         print("skipped: network namespaces need root")
         return 77
     run("ip", "netns", "del", "limn-probe", check=False)
-    arguments.prepared = arguments.folder.resolve() / "prepared"
-    subprocess.run(["rm", "-rf", arguments.prepared], check=True)
-    arguments.prepared.mkdir(parents=True)
-    prepare(arguments.limn.resolve(), arguments.prepared)
-    known = {scenario.__name__: scenario for scenario in SCENARIOS}
+    subprocess.run(["rm", "-rf", *arguments.folder.glob("prepared-*")], check=True)
+    known = {scenario.__name__: scenario for scenario in SCENARIOS + BY_NAME}
     failed = 0
-    for name in arguments.scenarios or known:
+    for name in arguments.scenarios or [scenario.__name__ for scenario in SCENARIOS]:
         runs = []
         for number in range(arguments.repeat):
             begun, load = time.monotonic(), os.getloadavg()[0]
