@@ -10,11 +10,16 @@
 
 namespace limn::apps {
 
+std::span<const std::string_view> bench_names() {
+  static constexpr std::array<std::string_view, 10> k_names = {
+      "tracker", "id", "calib", "solve", "projector", "live", "prediction", "remote", "tablet", "room"};
+  return k_names;
+}
+
 Status run_bench(const BenchOptions& options) {
-  constexpr std::array k_names = {"tracker", "id",         "calib",  "solve",  "projector",
-                                  "live",    "prediction", "remote", "tablet", "room"};
-  if (std::find(k_names.begin(), k_names.end(), options.name) == k_names.end())
-    return usage_error("bench: expected {}, found '{}'.", fmt::join(k_names, ", "), options.name);
+  const auto names = bench_names();
+  if (std::find(names.begin(), names.end(), options.name) == names.end())
+    return usage_error("bench: expected {}, found '{}'.", fmt::join(names, ", "), options.name);
   std::error_code problem;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", problem);
   const auto program = self.parent_path() / "tests" / "bench" / (options.name + "_bench");

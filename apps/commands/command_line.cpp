@@ -10,6 +10,7 @@
 
 #include "apps/commands/commands.h"
 #include "apps/commands/options.h"
+#include "apps/complete.h"
 #include "apps/output_files.h"
 #include "core/print.h"
 #include "core/version.h"
@@ -44,6 +45,16 @@ Error bug(const std::exception& problem) {
   return error("this is a bug in Limn, please report it: {}", problem.what());
 }
 
+// `limn complete LIST WORDS…`, which the completions of the shells call: prints one candidate on each line.
+void print_candidates(const std::string& list,
+                      const std::vector<std::string>& words,
+                      const std::vector<CLI::App*>& commands) {
+  if (list == "commands")
+    for (const CLI::App* command : commands) print_text(command->get_name() + "\n");
+  else if (const auto candidates = completion_list(list, words))
+    for (const std::string& candidate : *candidates) print_text(candidate + "\n");
+}
+
 int run_arguments(int argc, char** argv) {
   CLI::App app{"Limn paints virtual parts onto a physical prototype with light."};
   app.name("limn");
@@ -73,12 +84,17 @@ int run_arguments(int argc, char** argv) {
   add_replay(app, run);
   add_simulate(app, run);
   add_doctor(app, run);
+  add_help(app, run);
 
   if (argc == 1) {
     print_text(app.help());
     return 2;
   }
   const auto commands = app.get_subcommands({});
+  if (argc > 2 && std::string_view(argv[1]) == "complete") {
+    print_candidates(argv[2], {argv + 3, argv + argc}, commands);
+    return 0;
+  }
   const auto is_named = [&](const CLI::App* command) { return argc > 1 && command->get_name() == argv[1]; };
   if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), is_named)) {
     std::string known;

@@ -13,7 +13,7 @@ using Run = std::function<int()>;
 
 // Each adds a command to the program: its name, options, help and examples. When the command is parsed, `run`
 // becomes what it does. This is the table of commands: the help, the man pages, the completions of the shells
-// and docs/commands.md are made from it (apps/commands/command_table.h).
+// and docs/commands.md are made from it (apps/commands/read_table.h, apps/documents/).
 
 void add_markers(CLI::App& app, Run& run);
 void add_detect(CLI::App& app, Run& run);
@@ -37,5 +37,6 @@ void add_node(CLI::App& app, Run& run);
 void add_replay(CLI::App& app, Run& run);
 void add_simulate(CLI::App& app, Run& run);
 void add_doctor(CLI::App& app, Run& run);
+void add_help(CLI::App& app, Run& run);
 
 }  // namespace limn::apps

@@ -25,17 +25,21 @@ CLI::App* add_import_rig(CLI::App* import, Run& run) {
       "Example: limn import rig intrinsics.yml extrinsics.yml --units m --camera-size 640x480 --out rig");
   auto options = std::make_shared<ImportRigOptions>();
   command->add_option("files", options->files, "File of the other program, or two that belong together")
+      ->type_name("FILE")
       ->required()
       ->expected(1, 2);
-  command->add_option("--out", options->out, "Rig folder to write")->required();
+  command->add_option("--out", options->out, "Rig folder to write")->type_name("FOLDER")->required();
   add_choice(command, "--units", &options->units, scene::k_length_units,
              "Unit of the file's lengths, where it does not say: that of the board's squares");
-  command->add_option("--camera-size", options->camera_size,
-                      "Size of the camera's images in pixels, such as 1280x960, where the file does not say");
-  command->add_option(
-      "--projector", options->projector_size,
-      "Likewise of the projector. OpenCV's stereo calibration: the second device is a projector "
-      "of this size, not a camera");
+  command
+      ->add_option("--camera-size", options->camera_size,
+                   "Size of the camera's images in pixels, such as 1280x960, where the file does not say")
+      ->type_name("WIDTHxHEIGHT");
+  command
+      ->add_option("--projector", options->projector_size,
+                   "Likewise of the projector. OpenCV's stereo calibration: the second device is a projector "
+                   "of this size, not a camera")
+      ->type_name("WIDTHxHEIGHT");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each device");
   command->callback([options, &run] { run = [options] { return report_result(run_import_rig(*options)); }; });
   return command;
@@ -53,16 +57,25 @@ void add_render(CLI::App& app, Run& run) {
       "rendered");
   auto options = std::make_shared<RenderOptions>();
   command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")
+      ->type_name("RIG")
       ->required();
-  command->add_option("--scene", options->scene, "Scene folder or its scene.json")->required();
-  command->add_option(
-      "--frame", options->frames,
-      "CAMERA=IMAGE, a photograph whose markers place the scene; repeat the option for other cameras");
-  command->add_option("--poses", options->poses,
-                      "POSES.json that places the scene; the images of --frame are then only drawn over");
-  command->add_option("--viewer", options->viewers,
-                      "Viewer file; repeat the option for several viewers, who share one viewpoint in which "
-                      "the nearest counts most. Without it: the scene's viewers, or else camera 0");
+  command->add_option("--scene", options->scene, "Scene folder or its scene.json")
+      ->type_name("SCENE")
+      ->required();
+  command
+      ->add_option(
+          "--frame", options->frames,
+          "CAMERA=IMAGE, a photograph whose markers place the scene; repeat the option for other cameras")
+      ->type_name("CAMERA=IMAGE");
+  command
+      ->add_option("--poses", options->poses,
+                   "POSES.json that places the scene; the images of --frame are then only drawn over")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--viewer", options->viewers,
+                   "Viewer file; repeat the option for several viewers, who share one viewpoint in which "
+                   "the nearest counts most. Without it: the scene's viewers, or else camera 0")
+      ->type_name("FILE.json");
   add_choice(command, "--composite", &options->composite, k_composites,
              "What composites draw: full (whole parts) or rest (only what light cannot show)");
   command->add_flag("--undistorted", options->undistorted,
@@ -72,19 +85,25 @@ void add_render(CLI::App& app, Run& run) {
              "parts keep their values");
   add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
              "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
-  command->add_option(
-      "--view", options->view,
-      "Viewer file of a virtual camera; writes view.png with prototype and parts as it sees them");
-  command->add_option(
-      "--stereo", options->stereo_mm,
-      "With --view: distance between two virtual cameras in mm; view.png shows their images side by side");
+  command
+      ->add_option(
+          "--view", options->view,
+          "Viewer file of a virtual camera; writes view.png with prototype and parts as it sees them")
+      ->type_name("FILE.json");
+  command
+      ->add_option(
+          "--stereo", options->stereo_mm,
+          "With --view: distance between two virtual cameras in mm; view.png shows their images side by side")
+      ->type_name("PROJECTOR");
   add_choice(command, "--compensation", &options->light.compensation, k_compensations,
              "What the projected light compensates for: none; geometry (distance, incidence, vignetting and "
              "the scene's albedo); measured (albedo, colours, ambient and black light as measured by the "
              "rig's response images)");
-  command->add_option(
-      "--measured-at", options->light.measured_at,
-      "POSES.json with the prototype's pose in the response images; without it, the pose where it is drawn");
+  command
+      ->add_option("--measured-at", options->light.measured_at,
+                   "POSES.json with the prototype's pose in the response images; without it, the pose where "
+                   "it is drawn")
+      ->type_name("FILE.json");
   command->add_option(
       "--level", options->light.level,
       "With compensation: brightness of white as an irradiance, where 1 is a projector's white at 1 m "
@@ -92,7 +111,9 @@ void add_render(CLI::App& app, Run& run) {
   add_choice(
       command, "--black", &options->light.even_black, k_blacks,
       "Black light of the projectors: as-is, or even (overlaps of projectors do not show in the dark)");
-  command->add_option("--out", options->out, "Folder for the images and coverage.json")->required();
+  command->add_option("--out", options->out, "Folder for the images and coverage.json")
+      ->type_name("FOLDER")
+      ->required();
   command->callback([options, &run] { run = [options] { return report_result(run_render(*options)); }; });
 }
 
@@ -108,14 +129,18 @@ void add_check(CLI::App& app, Run& run) {
       "Example: limn check config/checks/door-moved.json --out checked\n"
       "Example: limn check --against from-the-other-machine");
   auto options = std::make_shared<CheckOptions>();
-  command->add_option("checks", options->files,
-                      "Check files (limn.check/1); without them all of config/checks");
+  command
+      ->add_option("checks", options->files, "Check files (limn.check/1); without them all of config/checks")
+      ->type_name("FILE.json");
   command->add_option("--out", options->out, "Folder for check.html, check.json and the images")
+      ->type_name("FOLDER")
       ->capture_default_str();
   command->add_flag("--json", options->json, "Print check.json instead of a table");
-  command->add_option("--against", options->against,
-                      "OUT folder of another run of the same checks, for instance on another machine or "
-                      "driver; at most 0.1 % of an image's pixels may differ by more than two levels");
+  command
+      ->add_option("--against", options->against,
+                   "OUT folder of another run of the same checks, for instance on another machine or "
+                   "driver; at most 0.1 % of an image's pixels may differ by more than two levels")
+      ->type_name("FOLDER");
   command->callback([options, &run] { run = [options] { return report_result(run_check(*options)); }; });
 }
 
@@ -138,31 +163,44 @@ void add_export(CLI::App& app, Run& run) {
       "poses.json\n"
       "Example: limn export --opencv cameras --kalibr camchain.yaml --rig rig");
   auto options = std::make_shared<exchange::ExportOptions>();
-  command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write");
+  command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write")->type_name("FILE.mpcdi");
   add_choice(command, "--profile", &options->profile, exchange::k_written_mpcdi_profiles,
              "MPCDI profile: sl (shader lamps), a3 (advanced 3D) or 3d (one viewer)");
   command->add_option("--gamma", options->gamma, "Gamma of the alpha maps (gammaEmbedded); 1 is linear")
       ->capture_default_str();
   command->add_option("--bits", options->bits, "Bits of the alpha and beta maps, 8 or 16")
       ->capture_default_str();
-  command->add_option("--warp", options->warp,
-                      "Folder for warp-PROJECTOR.pfm or .exr, the points that the pixels light");
+  command
+      ->add_option("--warp", options->warp,
+                   "Folder for warp-PROJECTOR.pfm or .exr, the points that the pixels light")
+      ->type_name("FOLDER");
   add_choice(command, "--format", &options->format, exchange::k_warp_formats,
              "File format of --warp: pfm or exr (R, G, B are x, y, z)");
-  command->add_option("--looks", options->looks,
-                      "Folder for look-SLOT-VARIANT.png, each variant as the viewer sees it");
-  command->add_option("--opencv", options->opencv, "Folder for NAME.yml, OpenCV's camera files");
-  command->add_option("--ros", options->ros, "Folder for NAME.yaml, ROS's camera_info files");
-  command->add_option(
-      "--kalibr", options->kalibr,
-      "Kalibr's camchain to write: cameras, then projectors, each relative to the one before");
+  command
+      ->add_option("--looks", options->looks,
+                   "Folder for look-SLOT-VARIANT.png, each variant as the viewer sees it")
+      ->type_name("FOLDER");
+  command->add_option("--opencv", options->opencv, "Folder for NAME.yml, OpenCV's camera files")
+      ->type_name("FOLDER");
+  command->add_option("--ros", options->ros, "Folder for NAME.yaml, ROS's camera_info files")
+      ->type_name("FOLDER");
+  command
+      ->add_option("--kalibr", options->kalibr,
+                   "Kalibr's camchain to write: cameras, then projectors, each relative to the one before")
+      ->type_name("FILE.yaml");
   command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")
+      ->type_name("RIG")
       ->required();
-  command->add_option("--scene", options->scene,
-                      "Scene folder or its scene.json, for --mpcdi, --warp and --looks");
-  command->add_option("--poses", options->poses, "POSES.json with the pose of the prototype, likewise");
-  command->add_option("--viewer", options->viewer,
-                      "Viewer file for --profile 3d and --looks; without it the scene's viewer");
+  command
+      ->add_option("--scene", options->scene,
+                   "Scene folder or its scene.json, for --mpcdi, --warp and --looks")
+      ->type_name("SCENE");
+  command->add_option("--poses", options->poses, "POSES.json with the pose of the prototype, likewise")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--viewer", options->viewer,
+                   "Viewer file for --profile 3d and --looks; without it the scene's viewer")
+      ->type_name("FILE.json");
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print JSON instead of a line for each projector");
   command->callback([options, json, &run] {
@@ -179,9 +217,11 @@ void add_import(CLI::App& app, Run& run) {
       "Example: limn import theirs.mpcdi --out rig\n"
       "Rigs of other programs: limn import rig --help");
   auto options = std::make_shared<ImportOptions>();
-  command->add_option("file", options->file, "Archive (.mpcdi) or XML (.mpcdi.xml)");
-  command->add_option("--out", options->out,
-                      "Rig folder to write, in the file's own coordinate frame (profile sl)");
+  command->add_option("file", options->file, "Archive (.mpcdi) or XML (.mpcdi.xml)")->type_name("FILE");
+  command
+      ->add_option("--out", options->out,
+                   "Rig folder to write, in the file's own coordinate frame (profile sl)")
+      ->type_name("FOLDER");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each region");
   const CLI::App* rig = add_import_rig(command, run);
   command->callback([options, rig, &run] {

@@ -32,26 +32,35 @@ void add_markers(CLI::App& app, Run& run) {
           "--family", options->family,
           "Marker family, such as apriltag_36h11, apriltag_41h12, artoolkit_3x3 or artoolkit:hiro.patt; "
           "white on black with _inverted: aruco_4x4_50_inverted")
+      ->type_name("FAMILY")
       ->capture_default_str();
   command->add_option("--ids", options->ids, "Numbers of the markers, such as 0-11,15")
+      ->type_name("NUMBERS")
       ->capture_default_str();
   command->add_option("--size-mm", options->size_mm, "Side of the marker's square in mm")
       ->capture_default_str();
-  command->add_option("--board", options->board,
-                      "Make a calibration board instead of markers, such as charuco:11x8:25mm, "
-                      "chessboard:9x7:75mm or aprilgrid:6x6:88mm:0.3");
-  auto* learn = command->add_option(
-      "--learn-body", learning->images,
-      "Instead of a sheet: measure from these photographs where the markers of a rigid body are on it");
-  command->add_option(
-      "--camera", learning->camera,
-      "With --learn-body and --learn-constellation: camera file (.cameramodel or another format)");
+  command
+      ->add_option("--board", options->board,
+                   "Make a calibration board instead of markers, such as charuco:11x8:25mm, "
+                   "chessboard:9x7:75mm or aprilgrid:6x6:88mm:0.3")
+      ->type_name("BOARD");
+  auto* learn = command
+                    ->add_option("--learn-body", learning->images,
+                                 "Instead of a sheet: measure from these photographs where the markers of a "
+                                 "rigid body are on it")
+                    ->type_name("IMAGE");
+  command
+      ->add_option(
+          "--camera", learning->camera,
+          "With --learn-body and --learn-constellation: camera file (.cameramodel or another format)")
+      ->type_name("FILE");
   auto balls = std::make_shared<LearnConstellationOptions>();
   auto* learn_balls =
       command
           ->add_option("--learn-constellation", balls->images,
                        "Instead of a sheet: measure from these photographs where the balls of a "
                        "rigid body are on it")
+          ->type_name("IMAGE")
           ->excludes(learn);
   command->add_option("--ball-mm", balls->ball_mm, "With --learn-constellation: diameter of the balls in mm")
       ->needs(learn_balls)
@@ -66,29 +75,39 @@ void add_markers(CLI::App& app, Run& run) {
   command
       ->add_option("--others", balls->others,
                    "With --learn-constellation: constellation files that the new one must differ from")
+      ->type_name("FILE.json")
       ->needs(learn_balls);
-  auto* train =
-      command->add_option("--train", options->train,
-                          "Instead of a sheet: make a template from the one black frame in this image");
+  auto* train = command
+                    ->add_option("--train", options->train,
+                                 "Instead of a sheet: make a template from the one black frame in this image")
+                    ->type_name("IMAGE");
   command
       ->add_option("--pattern-ratio", options->pattern_ratio,
                    "With --train: width of the frame's inside as share of the frame's (AR.js: patternRatio)")
       ->needs(train)
       ->capture_default_str();
   auto* compare =
-      command->add_option("--compare", options->compare,
-                          "Instead of a sheet: measure how well these templates can be distinguished");
-  command->add_option("--json", options->json, "With --compare: file for the report")->needs(compare);
+      command
+          ->add_option("--compare", options->compare,
+                       "Instead of a sheet: measure how well these templates can be distinguished")
+          ->type_name("FILE.patt");
+  command->add_option("--json", options->json, "With --compare: file for the report")
+      ->type_name("FILE.json")
+      ->needs(compare);
   compare->excludes(train);
-  auto* mount = command->add_option("--mount", options->mount,
-                                    "Make a 3D-printable holder (.stl, in mm) for a marker of --size-mm and "
-                                    "write its pose beside it; with --out also make the sheet");
+  auto* mount = command
+                    ->add_option("--mount", options->mount,
+                                 "Make a 3D-printable holder (.stl, in mm) for a marker of --size-mm and "
+                                 "write its pose beside it; with --out also make the sheet")
+                    ->type_name("FILE.stl");
   command->add_option("--paper-mm", options->paper_mm, "With --mount: thickness of paper and glue in mm")
       ->needs(mount)
       ->capture_default_str();
-  command->add_option(
-      "--out", options->out,
-      "File to write: .pdf or .svg, for a board also .png, for a body .json, for a template .patt");
+  command
+      ->add_option(
+          "--out", options->out,
+          "File to write: .pdf or .svg, for a board also .png, for a body .json, for a template .patt")
+      ->type_name("FILE");
   command->callback([options, learning, balls, &run] {
     run = [options, learning, balls] {
       if (!balls->images.empty()) {
@@ -121,6 +140,7 @@ void add_detect(CLI::App& app, Run& run) {
           "images", options->images,
           "Images: PNG, JPEG, PGM, PPM, BMP, TIFF, WebP or TGA, rows as stored (an EXIF orientation is "
           "ignored)")
+      ->type_name("IMAGE")
       ->required();
   command
       ->add_option(
@@ -128,20 +148,26 @@ void add_detect(CLI::App& app, Run& run) {
           "Marker families to look for, separated by commas; white markers on black with _inverted, such as "
           "aruco_4x4_50_inverted; templates with another pattern ratio than 0.5 as "
           "artoolkit:logo.patt@0.8")
+      ->type_name("FAMILY")
       ->delimiter(',')
       ->capture_default_str();
-  command->add_option("--camera", options->camera,
-                      "Camera file of mrcal, OpenCV, ROS, Kalibr, PhotonVision, ORB-SLAM or ARToolKit; "
-                      "FILE:NAME for one of several");
+  command
+      ->add_option("--camera", options->camera,
+                   "Camera file of mrcal, OpenCV, ROS, Kalibr, PhotonVision, ORB-SLAM or ARToolKit; "
+                   "FILE:NAME for one of several")
+      ->type_name("FILE");
   command->add_option("--size-mm", options->size_mm,
                       "Side of the black square in mm; with --camera it gives poses");
   add_choice(command, "--pose", &options->pose, k_pose_methods,
              "How poses are computed: ippe, or triangle (the method of the 2011 paper)");
   add_choice(command, "--encoding", &options->encoding, tracker::k_encodings,
              "Encoding of grey levels: linear (proportional to light) or srgb (webcams, photographs)");
-  command->add_option("--csv", options->csv, "CSV file to write, one row for each marker");
-  command->add_option("--json", options->json, "JSON file to write: corners, poses, covariances");
-  command->add_option("--draw", options->draw, "Folder for copies of the images with the markers drawn in");
+  command->add_option("--csv", options->csv, "CSV file to write, one row for each marker")
+      ->type_name("FILE.csv");
+  command->add_option("--json", options->json, "JSON file to write: corners, poses, covariances")
+      ->type_name("FILE.json");
+  command->add_option("--draw", options->draw, "Folder for copies of the images with the markers drawn in")
+      ->type_name("FOLDER");
   command
       ->add_option("--threads", options->threads,
                    "Number of images to process at the same time; with one image or --repeat, number of "
@@ -158,6 +184,7 @@ void add_detect(CLI::App& app, Run& run) {
           ->add_option("--constellation", balls->constellations,
                        "Find these constellations of balls instead of markers (files of limn markers "
                        "--learn-constellation), separated by commas")
+          ->type_name("FILE.json")
           ->delimiter(',');
   for (const char* other : {"--family", "--size-mm", "--pose", "--csv", "--draw", "--threads", "--repeat"})
     constellation->excludes(command->get_option(other));

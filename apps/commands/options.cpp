@@ -42,12 +42,16 @@ void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
       command, "--import", &options->import_format, wizard::k_import_formats,
       "Read captures of another program: opencv-gray, Gray code in any order; phase, phase-shifted waves as "
       "--steps, --periods, --cue, --wave and --order describe");
-  command->add_option("--projector", options->projector,
-                      "With --import: size of the projector in pixels, such as 1024x768");
-  command->add_option(
-      "--board", options->board,
-      "With --import or --cameras-only: board, such as chessboard:9x7:75mm (counted in inner corners), "
-      "charuco:11x8:25mm, circles:11x7:20mm or acircles:4x11:20mm");
+  command
+      ->add_option("--projector", options->projector,
+                   "With --import: size of the projector in pixels, such as 1024x768")
+      ->type_name("WIDTHxHEIGHT");
+  command
+      ->add_option(
+          "--board", options->board,
+          "With --import or --cameras-only: board, such as chessboard:9x7:75mm (counted in inner corners), "
+          "charuco:11x8:25mm, circles:11x7:20mm or acircles:4x11:20mm")
+      ->type_name("BOARD");
   command
       ->add_option_function<std::vector<std::string>>(
           "--shots",
@@ -56,14 +60,19 @@ void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
           },
           "With --import: name pattern of the images; for several cameras one for each, separated by commas, "
           "such as 'left_*.png,right_*.png' or camera0='left_*',camera1='right_*'")
+      ->type_name("PATTERN")
       ->delimiter(',')
       ->default_str(options->shots);
-  command->add_option(
-      "--order", options->order,
-      "With --import: what is known of the images' order, words separated by commas: white-first, "
-      "black-first, "
-      "white-last, no-white; inverse-second, inverse-first, inverses-behind, inverses-before, no-inverses; "
-      "columns-first, rows-first, columns-only; widest-first, finest-first. The rest is found in the images");
+  command
+      ->add_option(
+          "--order", options->order,
+          "With --import: what is known of the images' order, words separated by commas: white-first, "
+          "black-first, "
+          "white-last, no-white; inverse-second, inverse-first, inverses-behind, inverses-before, "
+          "no-inverses; "
+          "columns-first, rows-first, columns-only; widest-first, finest-first. The rest is found in the "
+          "images")
+      ->type_name("WORDS");
   command
       ->add_option(
           "--step", options->step_px,
@@ -94,27 +103,36 @@ void add_foreign_options(CLI::App* command, wizard::ForeignOptions* options) {
 }
 
 void add_board_measured(CLI::App* command, std::string* text) {
-  command->add_option(
-      "--board-measured", *text,
-      "Measured size of the printed board, from its first to its last inner corner, across and down, with "
-      "the "
-      "uncertainty in mm: 225.2x149.9mm:0.05 (0.1 when absent). The print's errors are then solved, too");
+  command
+      ->add_option(
+          "--board-measured", *text,
+          "Measured size of the printed board, from its first to its last inner corner, across and down, "
+          "with "
+          "the "
+          "uncertainty in mm: 225.2x149.9mm:0.05 (0.1 when absent). The print's errors are then solved, too")
+      ->type_name("WIDTHxHEIGHTmm");
 }
 
 void add_room_options(CLI::App* command, RoomOptions* options) {
-  command->add_option("--name", options->name,
-                      "This machine's name in the room; without it the machine's own");
-  command->add_option(
-      "--peer", options->peers,
-      "Address of another machine of the room, for networks without multicast; may be repeated");
-  command->add_option("--interface", options->interfaces,
-                      "Network interface to use; may be repeated; without it all that work");
+  command
+      ->add_option("--name", options->name, "This machine's name in the room; without it the machine's own")
+      ->type_name("NAME");
+  command
+      ->add_option("--peer", options->peers,
+                   "Address of another machine of the room, for networks without multicast; may be repeated")
+      ->type_name("ADDRESS");
+  command
+      ->add_option("--interface", options->interfaces,
+                   "Network interface to use; may be repeated; without it all that work")
+      ->type_name("NAME");
 }
 
 void add_room_of_devices(CLI::App* command, RoomOptions* options) {
-  command->add_option(
-      "--room", options->room,
-      "Name or folder of a room: devices with host in the devices file are at its other machines");
+  command
+      ->add_option(
+          "--room", options->room,
+          "Name or folder of a room: devices with host in the devices file are at its other machines")
+      ->type_name("ROOM");
   add_room_options(command, options);
 }
 

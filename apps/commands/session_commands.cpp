@@ -26,6 +26,7 @@ void add_bench(CLI::App& app, Run& run) {
           "name", options->name,
           "Benchmark to run: tracker, id, calib, solve, projector, live, prediction, remote, tablet or room; "
           "arguments after it are passed on to it")
+      ->type_name("BENCH")
       ->required();
   command->prefix_command();
   command->callback([command, options, &run] {
@@ -40,6 +41,7 @@ void add_demo(CLI::App& app, Run& run) {
   command->footer("Example: limn demo --out out   (then open out/demo.html)");
   auto options = std::make_shared<DemoOptions>();
   command->add_option("--out", options->out, "Folder for the images, demo.html and demo.json")
+      ->type_name("FOLDER")
       ->capture_default_str();
   command->add_flag("--window", options->window, "Also show the images in a window; Escape closes it");
   command->add_flag("--keep-captures", options->keep_captures,
@@ -68,18 +70,28 @@ void add_live(CLI::App& app, Run& run) {
       "Example: limn live --trackers trackers.json --window   (docs/trackers.md)\n"
       "Example: limn live --window --serve 8080   (docs/remote.md)");
   auto options = std::make_shared<LiveOptions>();
-  command->add_option(
-      "--rig", options->rig,
-      "Rig folder, rig.json or folder of .cameramodel files; without it the virtual world's own rig");
-  command->add_option("--scene", options->scene,
-                      "Scene folder or its scene.json; without it the virtual world's own scene");
-  command->add_option("--devices", options->devices,
-                      "File that names the cameras and displays (limn.devices/1); without it a virtual rig");
-  command->add_option(
-      "--world", options->world,
-      "World of the virtual rig (limn.world/1); without it, and without rig and scene, the world studio");
-  command->add_option("--script", options->script,
-                      "File that says what happens in the virtual room (limn.script/1)");
+  command
+      ->add_option(
+          "--rig", options->rig,
+          "Rig folder, rig.json or folder of .cameramodel files; without it the virtual world's own rig")
+      ->type_name("RIG");
+  command
+      ->add_option("--scene", options->scene,
+                   "Scene folder or its scene.json; without it the virtual world's own scene")
+      ->type_name("SCENE");
+  command
+      ->add_option("--devices", options->devices,
+                   "File that names the cameras and displays (limn.devices/1); without it a virtual rig")
+      ->type_name("FILE.json");
+  command
+      ->add_option(
+          "--world", options->world,
+          "World of the virtual rig (limn.world/1); without it, and without rig and scene, the world studio")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--script", options->script,
+                   "File that says what happens in the virtual room (limn.script/1)")
+      ->type_name("FILE.json");
   command->add_option("--seconds", options->seconds,
                       "Length in seconds of the session's clock; without it the script's length, or until "
                       "somebody ends the session");
@@ -87,9 +99,12 @@ void add_live(CLI::App& app, Run& run) {
       "--resolution", options->resolution,
       "Scale of the virtual devices' image sides, over 0 and at most 1. Without it 1, or with "
       "--window, --serve, --osc or --trackers what this machine computes in real time");
-  command->add_option("--record", options->record, "Folder for a recording that limn replay can play");
-  command->add_option("--out", options->out,
-                      "Folder for poses.csv, telemetry.csv, session.html and the last images");
+  command->add_option("--record", options->record, "Folder for a recording that limn replay can play")
+      ->type_name("FOLDER");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for poses.csv, telemetry.csv, session.html and the last images")
+      ->type_name("FOLDER");
   command->add_flag("--window", options->window,
                     "Open the operator's window: images, devices, parts, looks, telemetry, keys");
   add_choice(command, "--prediction", &options->prediction, tracker::k_predictions,
@@ -99,28 +114,42 @@ void add_live(CLI::App& app, Run& run) {
              "--prediction hold or linear)");
   add_choice(command, "--marker-light", &options->marker_light, tracker::k_marker_lights,
              "Light on markers: as-is (like the rest), keep-out (dark) or spotlight (white)");
-  command->add_option("--stereo", options->stereo,
-                      "Projector of the virtual rig that shows an image to each eye of the viewer; repeat it "
-                      "for several. For devices, stereo is set in the devices file");
-  command->add_option("--osc", options->osc,
-                      "PORT or ADDRESS:PORT at which OSC messages of other programs are received; a port "
-                      "alone accepts this machine only");
-  command->add_option("--osc-from", options->osc_from,
-                      "Numeric address of the only machine whose OSC messages are accepted");
-  command->add_option("--osc-to", options->osc_to, "HOST:PORT to which changes are sent by OSC");
-  command->add_option("--trackers", options->trackers,
-                      "File that names other tracking systems whose poses are used (limn.trackers/1)");
-  command->add_option(
-      "--poses-out", options->poses_out,
-      "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
-      "freed or json; or ros for ROS 2; may be repeated");
+  command
+      ->add_option("--stereo", options->stereo,
+                   "Projector of the virtual rig that shows an image to each eye of the viewer; repeat it "
+                   "for several. For devices, stereo is set in the devices file")
+      ->type_name("PROJECTOR");
+  command
+      ->add_option("--osc", options->osc,
+                   "PORT or ADDRESS:PORT at which OSC messages of other programs are received; a port "
+                   "alone accepts this machine only")
+      ->type_name("PORT");
+  command
+      ->add_option("--osc-from", options->osc_from,
+                   "Numeric address of the only machine whose OSC messages are accepted")
+      ->type_name("ADDRESS");
+  command->add_option("--osc-to", options->osc_to, "HOST:PORT to which changes are sent by OSC")
+      ->type_name("ADDRESS");
+  command
+      ->add_option("--trackers", options->trackers,
+                   "File that names other tracking systems whose poses are used (limn.trackers/1)")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--poses-out", options->poses_out,
+                   "PROTOCOL:HOST:PORT to which the poses of bodies and viewer are sent at each frame; psn, "
+                   "freed or json; or ros for ROS 2; may be repeated")
+      ->type_name("TARGET");
   add_room_of_devices(command, &options->room);
-  command->add_option("--serve", options->serve,
-                      "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
-                      "machine only, a network address is encrypted");
-  command->add_option(
-      "--serve-show", options->serve_show,
-      "Name of a projector that shows the remote's QR code and PIN (role work) for the first 60 s");
+  command
+      ->add_option("--serve", options->serve,
+                   "PORT or ADDRESS:PORT of the remote for phones and tablets; a port alone accepts this "
+                   "machine only, a network address is encrypted")
+      ->type_name("PORT");
+  command
+      ->add_option(
+          "--serve-show", options->serve_show,
+          "Name of a projector that shows the remote's QR code and PIN (role work) for the first 60 s")
+      ->type_name("PROJECTOR");
   command->add_flag("!--no-refill", options->refill,
                     "Do not fill shadows of people with the light of other projectors");
   command
@@ -145,8 +174,9 @@ void add_room(CLI::App& app, Run& run) {
       "Make a room: keys that machines need to work together. Copy its folder to the other machines");
   auto name = std::make_shared<std::string>();
   auto folder = std::make_shared<std::filesystem::path>();
-  create->add_option("name", *name, "The room's name")->required();
-  create->add_option("--out", *folder, "Folder for the keys; without it ~/.config/limn/rooms/NAME");
+  create->add_option("name", *name, "The room's name")->type_name("NAME")->required();
+  create->add_option("--out", *folder, "Folder for the keys; without it ~/.config/limn/rooms/NAME")
+      ->type_name("FOLDER");
   create->callback(
       [name, folder, &run] { run = [=] { return report_result(create_room(*name, *folder)); }; });
 }
@@ -159,10 +189,13 @@ void add_node(CLI::App& app, Run& run) {
       "Example: limn node --join studio   (docs/rooms.md)");
   auto options = std::make_shared<NodeCommand>();
   command->add_option("--join", options->room.room, "Name or folder of the room (limn room create)")
+      ->type_name("ROOM")
       ->required();
   add_room_options(command, &options->room);
-  command->add_option("--out", options->out,
-                      "Folder for shown.csv: when each image was shown, and its fingerprint");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for shown.csv: when each image was shown, and its fingerprint")
+      ->type_name("FOLDER");
   command->callback([options, &run] { run = [options] { return report_result(run_node(*options)); }; });
 }
 
@@ -174,9 +207,12 @@ void add_replay(CLI::App& app, Run& run) {
       "Example: limn replay recording --window --speed 1");
   auto options = std::make_shared<ReplayOptions>();
   command->add_option("session", options->session, "Recording folder that limn live --record wrote")
+      ->type_name("FOLDER")
       ->required();
-  command->add_option("--out", options->out,
-                      "Folder for poses.csv, telemetry.csv, session.html and the last images");
+  command
+      ->add_option("--out", options->out,
+                   "Folder for poses.csv, telemetry.csv, session.html and the last images")
+      ->type_name("FOLDER");
   command
       ->add_option("--speed", options->speed,
                    "Speed relative to the recorded session; 0 is as fast as possible")
@@ -192,14 +228,21 @@ void add_simulate(CLI::App& app, Run& run) {
       "simulate", "Simulate the images of a virtual rig's cameras, and write the ground truth");
   command->footer("Example: limn simulate config/worlds/studio.json --out simulated --variants mirror=sport");
   auto options = std::make_shared<SimulateOptions>();
-  command->add_option("world", options->world, "World file (limn.world/1)")->required();
-  command->add_option("--out", options->out, "Folder for the images, truth.json and the true rig")
+  command->add_option("world", options->world, "World file (limn.world/1)")
+      ->type_name("FILE.json")
       ->required();
-  command->add_option("--show", options->show,
-                      "PROJECTOR=IMAGE that a projector shows; repeat the option for other projectors");
-  command->add_option("--variants", options->variants,
-                      "SLOT=VARIANT,… for the image that shows the parts as physical objects; without it "
-                      "each slot's first variant");
+  command->add_option("--out", options->out, "Folder for the images, truth.json and the true rig")
+      ->type_name("FOLDER")
+      ->required();
+  command
+      ->add_option("--show", options->show,
+                   "PROJECTOR=IMAGE that a projector shows; repeat the option for other projectors")
+      ->type_name("PROJECTOR=IMAGE");
+  command
+      ->add_option("--variants", options->variants,
+                   "SLOT=VARIANT,… for the image that shows the parts as physical objects; without it "
+                   "each slot's first variant")
+      ->type_name("SLOT=VARIANT");
   command->add_flag("--srgb", options->srgb,
                     "Encode images as sRGB for people, instead of as the world's cameras do");
   command->callback([options, &run] { run = [options] { return report_result(run_simulate(*options)); }; });
@@ -215,10 +258,13 @@ void add_doctor(CLI::App& app, Run& run) {
       "Example: limn doctor --devices config/devices/studio.json --rig rig\n"
       "Example: limn doctor --room studio");
   auto options = std::make_shared<DoctorOptions>();
-  command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed");
+  command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed")
+      ->type_name("ROOM");
   add_room_options(command, &options->room);
-  auto* devices = command->add_option("--devices", options->devices, "Devices file (limn.devices/1) to test");
+  auto* devices = command->add_option("--devices", options->devices, "Devices file (limn.devices/1) to test")
+                      ->type_name("FILE.json");
   command->add_option("--rig", options->rig, "Rig folder; the devices must have its names and sizes")
+      ->type_name("RIG")
       ->needs(devices);
   command
       ->add_option(

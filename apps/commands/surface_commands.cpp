@@ -21,17 +21,22 @@ void add_scan(CLI::App& app, Run& run) {
       "scan\n"
       "Example: limn scan --plan config/plans/bench.json --rig rig --out scan");
   auto options = std::make_shared<ScanCommand>();
-  command->add_option("captures", options->captures,
-                      "Captures folder that shows the prototype in its pose folders");
-  command->add_option("--plan", options->plan,
-                      "Instead of captures: capture the prototype of this plan's world on the virtual rig");
-  command->add_option("--rig", options->rig, "Rig folder")->required();
-  command->add_option("--out", options->out, "Folder to write")->required();
+  command
+      ->add_option("captures", options->captures,
+                   "Captures folder that shows the prototype in its pose folders")
+      ->type_name("CAPTURES");
+  command
+      ->add_option("--plan", options->plan,
+                   "Instead of captures: capture the prototype of this plan's world on the virtual rig")
+      ->type_name("FILE.json");
+  command->add_option("--rig", options->rig, "Rig folder")->type_name("RIG")->required();
+  command->add_option("--out", options->out, "Folder to write")->type_name("FOLDER")->required();
   command
       ->add_option(
           "--poses", options->poses,
           "Names of poses to use, separated by commas; without it all poses that do not show the board. With "
           "--import: name patterns of the pose folders")
+      ->type_name("NAMES")
       ->delimiter(',');
   add_foreign_options(command, &options->foreign);
   command->add_flag("--moved", options->moved,
@@ -77,20 +82,28 @@ void add_recheck(CLI::App& app, Run& run) {
       "Example: limn recheck captures --rig rig --still rig-repaired/recheck.json --out rig-again\n"
       "Example: limn recheck --plan config/plans/studio.json --prototype --rig rig --out rig-repaired");
   auto options = std::make_shared<RecheckCommand>();
-  command->add_option("captures", options->captures, "Captures folder that shows the board or the prototype");
-  command->add_option("--devices", options->devices,
-                      "Instead of captures: capture with the rig's own cameras and projectors "
-                      "(limn.devices/1) for about 15 s, into OUT/captures");
-  command->add_option("--plan", options->plan,
-                      "Instead of captures: capture the first poses of this plan (15 s) on the virtual rig, "
-                      "into OUT/captures");
+  command->add_option("captures", options->captures, "Captures folder that shows the board or the prototype")
+      ->type_name("CAPTURES");
+  command
+      ->add_option("--devices", options->devices,
+                   "Instead of captures: capture with the rig's own cameras and projectors "
+                   "(limn.devices/1) for about 15 s, into OUT/captures")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--plan", options->plan,
+                   "Instead of captures: capture the first poses of this plan (15 s) on the virtual rig, "
+                   "into OUT/captures")
+      ->type_name("FILE.json");
   command->add_flag("--prototype", options->prototype,
                     "With --plan: capture the world's prototype instead of the board");
   command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")
+      ->type_name("RIG")
       ->required();
-  command->add_option("--still", options->still,
-                      "An earlier recheck.json; the board has not been moved since then");
-  command->add_option("--out", options->out, "Rig folder to write")->required();
+  command
+      ->add_option("--still", options->still,
+                   "An earlier recheck.json; the board has not been moved since then")
+      ->type_name("FILE.json");
+  command->add_option("--out", options->out, "Rig folder to write")->type_name("FOLDER")->required();
   command->add_flag("--json", options->json, "Print recheck.json instead of a table");
   command->callback([options, &run] { run = [options] { return report_result(run_recheck(*options)); }; });
 }
@@ -113,36 +126,47 @@ void add_align(CLI::App& app, Run& run) {
       "Example: limn align --scan scan --mesh door.glb --units m --body body.json --rig rig --frame "
       "camera0=photo.png --out aligned");
   auto options = std::make_shared<AlignCommand>();
-  command->add_option(
-      "--scan", options->scan,
-      "Scan: a PLY file or the folder of limn scan; without it the pose is computed from the markers alone");
+  command
+      ->add_option("--scan", options->scan,
+                   "Scan: a PLY file or the folder of limn scan; without it the pose is computed from the "
+                   "markers alone")
+      ->type_name("SCAN");
   add_choice(command, "--scan-units", &options->scan_units, scene::k_length_units,
              "Unit of the PLY file: m, cm, mm, in or ft");
-  command->add_option(
-      "--mesh", options->mesh,
-      "CAD mesh: .glb, .obj, .stl, .ply, .3mf, .fbx … (docs/formats.md); without it the scene's prototype");
+  command
+      ->add_option("--mesh", options->mesh,
+                   "CAD mesh: .glb, .obj, .stl, .ply, .3mf, .fbx … (docs/formats.md); without it the scene's "
+                   "prototype")
+      ->type_name("MESH");
   add_choice(command, "--units", &options->units, scene::k_length_units,
              "Unit of the CAD mesh: m, cm, mm, in or ft");
-  command->add_option("--start", options->start, "POSES.json with world_from_prototype, the initial pose");
-  command->add_option("--points", options->points,
-                      "PICKS.json: three or more pairs of corresponding points on CAD and scan");
-  command->add_option(
-      "--scene", options->scene,
-      "Scene whose prototype carries markers; with --rig and --frame they give the initial pose");
+  command->add_option("--start", options->start, "POSES.json with world_from_prototype, the initial pose")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--points", options->points,
+                   "PICKS.json: three or more pairs of corresponding points on CAD and scan")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--scene", options->scene,
+                   "Scene whose prototype carries markers; with --rig and --frame they give the initial pose")
+      ->type_name("SCENE");
   command
       ->add_option("--body", options->body,
                    "body.json of limn markers --learn-body; writes to markers.json where its markers are on "
                    "the CAD mesh")
+      ->type_name("FILE.json")
       ->check(CLI::ExistingFile);
-  command->add_option("--rig", options->rig, "Rig folder, needed for --frame");
-  command->add_option("--frame", options->frames,
-                      "CAMERA=IMAGE, a photograph of the prototype; repeat the option for other cameras");
+  command->add_option("--rig", options->rig, "Rig folder, needed for --frame")->type_name("RIG");
+  command
+      ->add_option("--frame", options->frames,
+                   "CAMERA=IMAGE, a photograph of the prototype; repeat the option for other cameras")
+      ->type_name("CAMERA=IMAGE");
   command
       ->add_option("--least-mm", options->least_mm,
                    "Smallest difference between CAD and scan to report, in mm")
       ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
-  command->add_option("--out", options->out, "Folder to write")->required();
+  command->add_option("--out", options->out, "Folder to write")->type_name("FOLDER")->required();
   command->add_flag("--json", options->json, "Print align.json instead of a line");
   command->callback([options, &run] { run = [options] { return report_result(run_align(*options)); }; });
 }
