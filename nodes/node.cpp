@@ -80,6 +80,7 @@ class NodeLoop {
       setup_.reset();
       log_warning("node: the host {} has gone; the light fades out until it is back", host_->sender.node);
       gone_at_ = now();
+      orders_.clear();
       cameras_.close_cameras();
     }
     host_ = host;

@@ -41,6 +41,9 @@ class Room {
   Status offer(const Offer& offer);
   Status send(const Message& message) { return link_->send(message); }
 
+  /// The link's warnings of the last 10 seconds (RoomLink::problems).
+  std::vector<std::string> problems() const { return link_->problems(); }
+
   /// The other machines that can be heard, by name.
   std::vector<Machine> machines() const;
   std::optional<Machine> find(const std::string& node) const;

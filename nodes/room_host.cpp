@@ -82,6 +82,7 @@ void RoomHost::apply_edits(const session::SessionMoment& moment) {
     for (const std::string& problem : node->health->problems)
       problems.insert(fmt::format("{}: {}", name, problem));
   }
+  for (std::string& problem : room_->problems()) problems.insert(std::move(problem));
   for (const std::string& problem : problems)
     if (!problems_.contains(problem)) moment.session.warn(moment.at, problem);
   problems_ = std::move(problems);
