@@ -27,10 +27,10 @@ bool is_development_build();
 
 /// What decides where the data folder is; data_file() fills it for this program.
 struct DataPlaces {
-  std::string chosen;                                    ///< The value of LIMN_DATA; "": not set.
-  std::filesystem::path program;                         ///< The program's own file.
+  std::string chosen = {};                               ///< The value of LIMN_DATA; "": not set.
+  std::filesystem::path program = {};                    ///< The program's own file.
   std::filesystem::path from_program = "../share/limn";  ///< From the program's folder to the data folder.
-  std::string version;                                   ///< The version that the data must have.
+  std::string version = {};                              ///< The version that the data must have.
 };
 
 /// The data folder by the rules of data_file().
