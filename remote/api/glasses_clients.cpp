@@ -148,7 +148,6 @@ Status GlassesClients::receive_view(const std::shared_ptr<WsClient>& client,
                                     const GlassesViewMessage& message) {
   if (!client->glasses || client->glasses->marker != k_by_camera)
     return error("glasses: expected a message that puts them on with a camera before its pictures.");
-  client->glasses->announced.reset();
   const StatedLens lens{message.width,      message.height,     message.lens_px[0],
                         message.lens_px[1], message.lens_px[2], message.lens_px[3]};
   // The picture follows in any case; it is read and left out.
