@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <new>
 
 #include "core/result.h"
 #include "sim/texture.h"
@@ -59,6 +60,15 @@ RTCGeometry geometry_of(RTCDevice device, Placed& placed) {
   return geometry;
 }
 
+// Embree keeps its last error until it is asked. Threads that cannot be started for want of memory are an
+// unknown error to it.
+void check_memory(RTCDevice device) {
+  const RTCError problem = rtcGetDeviceError(device);
+  if (problem == RTC_ERROR_OUT_OF_MEMORY || (device == nullptr && problem == RTC_ERROR_UNKNOWN))
+    throw std::bad_alloc();
+  LIMN_CHECK(device != nullptr && problem == RTC_ERROR_NONE);
+}
+
 }  // namespace
 
 struct RayScene::Impl {
@@ -101,7 +111,7 @@ struct RayScene::Impl {
 
 RayScene::RayScene(std::span<const MeshInstance> meshes, bool moves) : impl_(std::make_unique<Impl>()) {
   impl_->device = rtcNewDevice("threads=2");
-  LIMN_CHECK(impl_->device != nullptr);
+  check_memory(impl_->device);
   impl_->scene = rtcNewScene(impl_->device);
   rtcSetSceneFlags(impl_->scene,
                    moves ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_ROBUST);
@@ -115,6 +125,7 @@ RayScene::RayScene(std::span<const MeshInstance> meshes, bool moves) : impl_(std
     rtcReleaseGeometry(geometry);
   }
   rtcCommitScene(impl_->scene);
+  check_memory(impl_->device);
 }
 
 void RayScene::move(std::span<const std::size_t> meshes, std::span<const Pose> world_from_mesh) {
