@@ -4,10 +4,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "core/config.h"
 #include "core/file.h"
+#include "core/image_formats.h"
 #include "core/image_io.h"
 #include "core/json_text.h"
 
@@ -94,9 +94,8 @@ Result<Config> load_config(const fs::path& path) {
 
 Result<cv::Mat> load_map(const fs::path& path, double unit, int width, int height) {
   LIMN_TRY(const std::string bytes, read_file(path));
-  const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-  cv::Mat stored;
-  if (!bytes.empty()) stored = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
+  const auto image = image_formats::decode_png(bytes, false);
+  const cv::Mat stored = image ? image->samples : cv::Mat();
   if (stored.depth() != CV_16U || stored.cols != width || stored.rows != height ||
       (stored.channels() != 1 && stored.channels() != 3))
     return error("{}: expected a 16-bit PNG of {}x{}, found something else. Run limn solve again.",

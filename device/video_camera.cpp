@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <opencv2/videoio.hpp>
 #include <optional>
 #include <vector>
 
@@ -11,6 +10,7 @@
 #include "device/retry.h"
 #include "device/socket.h"
 #include "device/video_clock.h"
+#include "device/video_reader.h"
 
 namespace limn::device {
 namespace {
@@ -26,7 +26,7 @@ struct VideoCamera::Impl {
   VideoCameraOptions options;
   std::string source;              // path or address
   std::optional<Address> address;  // only for a stream
-  cv::VideoCapture video;
+  std::unique_ptr<VideoReader> video;
   cv::Size size;
   Retry retry;
   VideoClock clock;
@@ -43,7 +43,7 @@ struct VideoCamera::Impl {
 // Decodes the last grabbed frame.
 Result<cv::Mat> VideoCamera::Impl::retrieve() {
   cv::Mat image;
-  if (!video.retrieve(image) || image.empty() || image.depth() != CV_8U)
+  if (!video->retrieve(&image) || image.empty() || image.depth() != CV_8U)
     return error("expected an 8-bit frame, found one that cannot be decoded.");
   if (!size.empty() && image.size() != size)
     return error("expected {}x{} as in the first frame, found {}x{}. Reset the camera's size or start again.",
@@ -52,20 +52,18 @@ Result<cv::Mat> VideoCamera::Impl::retrieve() {
 }
 
 Result<Frame> VideoCamera::Impl::next_of_file() {
-  if (!video.grab()) return error("{}: all {} frames of {} have been played.", options.name, frames, source);
+  if (!video->grab()) return error("{}: all {} frames of {} have been played.", options.name, frames, source);
   ++frames;
   auto image = retrieve();
   if (!image) return error("{}: frame {}: {}", source, frames - 1, image.message());
-  return Frame{options.name, *image, shifted(Stamp{}, video.get(cv::CAP_PROP_POS_MSEC) / 1000)};
+  return Frame{options.name, *image, shifted(Stamp{}, video->position_s())};
 }
 
 // OpenCV gives no reason for a failure, so the host's connection is tested first.
 Status VideoCamera::Impl::connect(Stamp deadline) {
   LIMN_TRY_STATUS(Socket::connect(address->host, address->port, deadline));
   const int left_ms = std::max(1, static_cast<int>(1000 * seconds_between(Clock::now(), deadline)));
-  const std::vector<int> limits = {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, left_ms, cv::CAP_PROP_READ_TIMEOUT_MSEC,
-                                   static_cast<int>(1000 * options.limit_s)};
-  if (!video.open(source, cv::CAP_FFMPEG, limits))
+  if (!video->open(source, {left_ms, static_cast<int>(1000 * options.limit_s)}))
     return error(
         "no video within the limit. Check the path, the name and password, and that it sends H.264 or "
         "MJPEG.");
@@ -80,8 +78,8 @@ Status VideoCamera::Impl::catch_up(Stamp deadline) {
   Stamp last_read = Clock::now();
   const Stamp enough = shifted(last_read, 0.5 * seconds_between(last_read, deadline));
   while (last_read < enough) {
-    if (!video.grab()) return error("the stream ended at its start.");
-    const double sent_s = video.get(cv::CAP_PROP_POS_MSEC) / 1000;
+    if (!video->grab()) return error("the stream ended at its start.");
+    const double sent_s = video->position_s();
     const Stamp read_at = Clock::now();
     clock.stamp(sent_s, read_at);
     const bool waited = last_sent_s && sent_s > *last_sent_s &&
@@ -96,9 +94,9 @@ Status VideoCamera::Impl::catch_up(Stamp deadline) {
 // The newest frame of an open stream.
 Result<Frame> VideoCamera::Impl::grab_newest(Stamp deadline) {
   for (;;) {
-    if (!video.grab()) return error("the stream ended or was silent.");
+    if (!video->grab()) return error("the stream ended or was silent.");
     const Stamp now = Clock::now();
-    const Stamp arrived_at = clock.stamp(video.get(cv::CAP_PROP_POS_MSEC) / 1000, now);
+    const Stamp arrived_at = clock.stamp(video->position_s(), now);
     if (seconds_between(arrived_at, now) > k_old_s && now < deadline) {
       ++dropped;
       continue;
@@ -111,10 +109,10 @@ Result<Frame> VideoCamera::Impl::grab_newest(Stamp deadline) {
 Result<Frame> VideoCamera::Impl::next_of_stream() {
   const Stamp deadline = shifted(Clock::now(), options.limit_s);
   while (Clock::now() < deadline) {
-    if (!video.isOpened()) {
+    if (!video->is_open()) {
       if (!retry.wait(deadline)) break;
       if (const Status done = connect(deadline); !done) {
-        video.release();
+        video->close();
         retry.note_failure(done.message());
       }
       continue;
@@ -125,7 +123,7 @@ Result<Frame> VideoCamera::Impl::next_of_stream() {
       ++frames;
       return frame;
     }
-    video.release();
+    video->close();
     retry.note_failure(frame.message());
   }
   return error("{} ({}): expected an image within {:g} s, found none: {}", options.name, address->shown,
@@ -145,11 +143,11 @@ Result<VideoCamera> VideoCamera::open_file(const std::filesystem::path& path,
   std::error_code problem;
   if (!std::filesystem::is_regular_file(path, problem))
     return error("{}: expected a video file, found no file. Check the path.", path.string());
-  if (impl->video.open(path.string(), cv::CAP_FFMPEG) && impl->next_of_file()) {
-    impl->size = cv::Size(static_cast<int>(impl->video.get(cv::CAP_PROP_FRAME_WIDTH)),
-                          static_cast<int>(impl->video.get(cv::CAP_PROP_FRAME_HEIGHT)));
+  LIMN_TRY(impl->video, make_video_reader());
+  if (impl->video->open(path.string(), {}) && impl->next_of_file()) {
+    impl->size = impl->video->size();
     impl->frames = 0;
-    if (impl->video.open(path.string(), cv::CAP_FFMPEG)) return VideoCamera(std::move(impl));
+    if (impl->video->open(path.string(), {})) return VideoCamera(std::move(impl));
   }
   return error("{}: expected a video, found none that can be decoded. Save it as H.264 or MJPEG.",
                path.string());
@@ -160,6 +158,7 @@ Result<VideoCamera> VideoCamera::open_rtsp(const std::string& url, const VideoCa
   impl->options = options;
   impl->source = url;
   LIMN_TRY(impl->address, parse_address(url, "rtsp", "554"));
+  LIMN_TRY(impl->video, make_video_reader());
   LIMN_TRY(const Frame first, impl->next_of_stream());
   impl->size = first.image.size();
   return VideoCamera(std::move(impl));

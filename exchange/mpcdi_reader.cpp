@@ -6,10 +6,10 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <pugixml.hpp>
 
 #include "core/file.h"
+#include "core/image_formats.h"
 #include "exchange/pfm.h"
 #include "exchange/zip.h"
 
@@ -157,17 +157,10 @@ Result<cv::Mat> read_png(const std::string& bytes, const cv::Size& wanted, const
     return error("{}: expected the region's size {}x{}, found {}x{}. Export it again.", where, wanted.width,
                  wanted.height, size->width, size->height);
   }
-  cv::Mat image;
-  if (bytes.rfind("IEND") != std::string::npos) {
-    const cv::Mat encoded(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
-    try {
-      image = cv::imdecode(encoded, cv::IMREAD_UNCHANGED);
-    } catch (const cv::Exception&) {
-      image.release();
-    }
-  }
-  if (image.empty())
+  const auto stored = image_formats::decode_png(bytes, false);
+  if (!stored)
     return error("{}: expected a whole PNG image, found a truncated or damaged one. Export it again.", where);
+  const cv::Mat image = stored->samples;
   if (image.channels() != 1 && image.channels() != 3)
     return error("{}: expected a grey or RGB image, found {} channels.", where, image.channels());
   return image;

@@ -1,10 +1,10 @@
 #include "exchange/mpcdi_writer.h"
 
-#include <opencv2/imgcodecs.hpp>
 #include <pugixml.hpp>
 #include <sstream>
 
 #include "core/file.h"
+#include "core/image_encoder.h"
 #include "exchange/pfm.h"
 #include "exchange/zip.h"
 
@@ -54,11 +54,7 @@ void add_region(pugi::xml_node buffer, const MpcdiRegion& region) {
   }
 }
 
-ZipFile png_file(const std::string& name, const cv::Mat& image) {
-  std::vector<uchar> png;
-  cv::imencode(".png", image, png);
-  return {name, std::string(png.begin(), png.end()), true};
-}
+ZipFile png_file(const std::string& name, const cv::Mat& image) { return {name, encode_png(image), true}; }
 
 void add_blend_map(pugi::xml_node fileset,
                    const char* name,

@@ -1,8 +1,9 @@
 #include "nodes/orders.h"
 
 #include <functional>
-#include <opencv2/imgcodecs.hpp>
 
+#include "core/image_encoder.h"
+#include "core/image_formats.h"
 #include "core/log.h"
 #include "device/devices_file.h"
 
@@ -37,11 +38,10 @@ Status open_display(const Order& order, NodeDisplays* devices, Answer* answer) {
 
 Status show(const Order& order, const ClockEstimate& clock, NodeDisplays* devices, Answer* answer) {
   LIMN_TRY(device::Display * display, display_of(order, devices));
-  const cv::Mat bytes(1, static_cast<int>(order.image.size()), CV_8U, const_cast<char*>(order.image.data()));
-  const cv::Mat image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
-  if (image.empty())
+  const auto image = image_formats::decode_png(order.image, false);
+  if (!image)
     return error("expected a PNG image to show, found {} bytes of something else.", order.image.size());
-  LIMN_TRY(const Stamp shown_at, display->show(image));
+  LIMN_TRY(const Stamp shown_at, display->show(image->samples));
   answer->at = clock.to_other(shown_at);
   return {};
 }
@@ -64,10 +64,7 @@ Status grab(const Order& order, const ClockEstimate& clock, NodeCameras* devices
       answer->image = *frame.jpeg;
       return {};
     }
-    std::vector<std::uint8_t> png;
-    if (!cv::imencode(".png", frame.image, png, {cv::IMWRITE_PNG_COMPRESSION, 1}))
-      return error("{}: the image could not be encoded.", camera->name());
-    answer->image.assign(png.begin(), png.end());
+    answer->image = encode_png(frame.image);
     return {};
   }
   return error("{}: expected an image that was exposed after the order within {} s, found none.",

@@ -1,8 +1,9 @@
 #include "nodes/remote_devices.h"
 
 #include <algorithm>
-#include <opencv2/imgcodecs.hpp>
 
+#include "core/image_encoder.h"
+#include "core/image_formats.h"
 #include "core/version.h"
 #include "device/devices_file.h"
 #include "device/jpeg.h"
@@ -47,11 +48,8 @@ Order RemoteDisplay::order(Order::What what) const {
 
 Result<Stamp> RemoteDisplay::show(const cv::Mat& image) {
   LIMN_TRY_STATUS(device::check_image(image, config_.name, size_));
-  std::vector<std::uint8_t> png;
-  if (!cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1}))
-    return error("{}: the image could not be encoded.", config_.name);
   Order order = this->order(Order::What::show);
-  order.image.assign(png.begin(), png.end());
+  order.image = encode_png(image);
   LIMN_TRY(const Answer answer, room_->ask(std::move(order), k_show_limit_s));
   return answer.at;
 }
@@ -89,8 +87,8 @@ Result<Frame> RemoteCamera::next() {
   if (is_jpeg) {
     LIMN_TRY(frame, device::decode_frame(std::move(answer.image)));
   } else {
-    const cv::Mat bytes(1, static_cast<int>(answer.image.size()), CV_8U, answer.image.data());
-    frame.image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+    LIMN_TRY(const image_formats::StoredImage stored, image_formats::decode_png(answer.image, false));
+    frame.image = stored.samples;
   }
   if (frame.image.size() != size_)
     return error("{}: expected an image of {}x{} from {}, found {}x{}.", config_.name, size_.width,

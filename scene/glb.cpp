@@ -3,8 +3,8 @@
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
+#include "core/image_encoder.h"
 #include "core/json_text.h"
 
 namespace limn::scene {
@@ -91,9 +91,7 @@ struct Document {
   ordered_json add_texture(const cv::Mat& image) {
     const auto [known, is_new] = textures.try_emplace(image.data, images.size());
     if (is_new) {
-      std::vector<std::uint8_t> png;
-      cv::imencode(".png", image, png);
-      images.push_back({{"bufferView", add_view({png.begin(), png.end()})}, {"mimeType", "image/png"}});
+      images.push_back({{"bufferView", add_view(encode_png(image))}, {"mimeType", "image/png"}});
     }
     return {{"index", known->second}};
   }

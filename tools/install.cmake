@@ -1,10 +1,10 @@
 # What `cmake --install BUILD [--prefix X] [--component program|data|docs]` installs. The installed tree can be moved: the program
-# finds its data and its own library from where it is (core/data_folder.h).
+# finds its data and its own libraries from where it is (core/data_folder.h).
 set(data ${CMAKE_INSTALL_DATADIR}/limn)
 set(install_files ${PROJECT_SOURCE_DIR}/tools/install)
 
 install(TARGETS limn RUNTIME COMPONENT program)
-install(TARGETS limn_room_dds LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
+install(TARGETS limn_room_dds limn_video LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
 install(FILES ${install_files}/limn.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT program)
 install(FILES ${install_files}/io.github.limn.metainfo.xml
   DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo COMPONENT program)

@@ -1,7 +1,6 @@
 #include "remote/api/thumbnails.h"
 
-#include <opencv2/imgcodecs.hpp>
-
+#include "core/image_encoder.h"
 #include "device/gl_context.h"
 #include "session/thumbnail.h"
 
@@ -31,10 +30,8 @@ Status Thumbnails::draw(const scene::Scene& scene) {
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, Rig{}));
   for (const scene::Slot& slot : scene.slots)
     for (const scene::Variant& variant : slot.variants) {
-      std::vector<std::uint8_t> png;
-      cv::imencode(".png", session::draw_thumbnail(&renderer, scene, slot.name, variant.name, k_side_px),
-                   png);
-      images_[{slot.name, variant.name}] = std::make_shared<const std::string>(png.begin(), png.end());
+      images_[{slot.name, variant.name}] = std::make_shared<const std::string>(
+          encode_png(session::draw_thumbnail(&renderer, scene, slot.name, variant.name, k_side_px)));
     }
   return {};
 }

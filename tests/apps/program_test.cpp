@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "core/file.h"
@@ -12,18 +13,29 @@ namespace {
 
 struct Ended {
   int code = -1;  // exit code; -1: ended by a signal
-  std::string err;
+  std::string out, err;
 };
 
 // Runs a line of bash in which LIMN is the program.
 Ended run_in_bash(const std::string& line) {
   const auto folder = test::test_folder();
   EXPECT_TRUE(write_file(folder / "line.sh", "LIMN() { \"" LIMN_PROGRAM "\" \"$@\"; }\n" + line + "\n"));
-  const std::string command =
-      "bash '" + (folder / "line.sh").string() + "' 2> '" + (folder / "err").string() + "'";
+  const std::string command = "bash '" + (folder / "line.sh").string() + "' > '" +
+                              (folder / "out.txt").string() + "' 2> '" + (folder / "err").string() + "'";
   const int status = std::system(command.c_str());
-  const auto err = read_file(folder / "err");
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, err ? *err : ""};
+  const auto out = read_file(folder / "out.txt"), err = read_file(folder / "err");
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, out ? *out : "", err ? *err : ""};
+}
+
+// FFmpeg and GDAL with all that they need, and DDS, would take most of the time of `limn --version`: the
+// program loads them when it needs them. 104 libraries were counted when this test was written, 279 before.
+TEST(Program, StartsWithFewLibraries) {
+  const Ended listed = run_in_bash("LD_TRACE_LOADED_OBJECTS=1 LIMN");
+  ASSERT_EQ(listed.code, 0) << listed.err;
+  EXPECT_NE(listed.out.find("libopencv_core"), std::string::npos) << listed.out;
+  EXPECT_LT(std::count(listed.out.begin(), listed.out.end(), '\n'), 130) << listed.out;
+  for (const char* late : {"libopencv_imgcodecs", "libopencv_videoio", "libavcodec", "libgdal", "libddsc"})
+    EXPECT_EQ(listed.out.find(late), std::string::npos) << late << " is loaded at the start.\n" << listed.out;
 }
 
 TEST(Program, SaysWhenItsOutputCannotBeWritten) {
