@@ -21,6 +21,8 @@ Result<fs::path> folder_of(const char* variable, const char* in_home) {
 
 Result<fs::path> user_folder() { return folder_of("XDG_CONFIG_HOME", ".config"); }
 
+Result<fs::path> user_data_folder() { return folder_of("XDG_DATA_HOME", ".local/share"); }
+
 Result<fs::path> user_cache_folder() { return folder_of("XDG_CACHE_HOME", ".cache"); }
 
 }  // namespace limn

@@ -10,6 +10,10 @@ namespace limn {
 /// XDG_CONFIG_HOME nor HOME is set.
 Result<std::filesystem::path> user_folder();
 
+/// The folder for what a user makes with Limn: $XDG_DATA_HOME/limn, else ~/.local/share/limn. Error: neither
+/// XDG_DATA_HOME nor HOME is set.
+Result<std::filesystem::path> user_data_folder();
+
 /// The folder for files that may be deleted at any time: $XDG_CACHE_HOME/limn, else ~/.cache/limn. Error:
 /// neither XDG_CACHE_HOME nor HOME is set.
 Result<std::filesystem::path> user_cache_folder();

@@ -1,10 +1,9 @@
 #include "session/show_store.h"
 
-#include <algorithm>
-
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "scene/kept_files.h"
 #include "session/contact_sheet.h"
 
 namespace limn::session {
@@ -51,20 +50,18 @@ std::string json_of(const std::vector<scene::Look>& looks, const std::string& na
 ShowStore::ShowStore(bool keeps) : writer_(keeps ? std::make_unique<FileWriter>() : nullptr) {}
 
 scene::ShowState ShowStore::loaded(const scene::Scene& scene, scene::ShowState show_state) {
-  std::error_code none;
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(scene.folder / "looks", none))
-    if (entry.path().extension() == ".json") files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  for (const fs::path& file : files) {
+  if (const fs::path folder = scene::kept_folder(scene.folder); folder != scene.folder)
+    log_info("live: {} cannot be written here, so looks are kept in {}.", scene.folder.string(),
+             folder.string());
+  for (const fs::path& file : scene::look_files(scene.folder)) {
     Result<scene::Look> look = scene::load_look(file, scene);
     if (look)
       show_state.looks.push_back(std::move(*look));
     else
       log_warning("live: {} This look is not used; its file was not changed.", look.message());
   }
-  const fs::path file = scene.folder / k_pairings;
-  if (!fs::exists(file, none)) return show_state;
+  const fs::path file = scene::kept_file(scene.folder, k_pairings);
+  if (std::error_code none; !fs::exists(file, none)) return show_state;
   auto paired = scene::with_pairings(file, scene, show_state);
   if (paired) return std::move(*paired);
   log_warning("live: {} The saved pairings are not used; the scene's own markers carry the parts.",
@@ -81,7 +78,7 @@ void ShowStore::keep(const scene::Scene& scene,
   keep_pairings(scene, before, after);
   if (const auto* unit = std::get_if<scene::PartUnit>(&command.value))
     keep_unit(scene, scene.slots[command.slot], *unit);
-  keep_looks(scene.folder / "looks", before, after, look_image);
+  keep_looks(scene::kept_folder(scene.folder) / "looks", before, after, look_image);
 }
 
 void ShowStore::keep_pairings(const scene::Scene& scene,
@@ -89,7 +86,8 @@ void ShowStore::keep_pairings(const scene::Scene& scene,
                               const scene::ShowState& after) {
   const std::string text = scene::pairings_json(scene, after);
   if (text == scene::pairings_json(scene, before)) return;
-  writer_->add([file = scene.folder / k_pairings, text]() -> Status {
+  writer_->add([file = scene::kept_folder(scene.folder) / k_pairings, text]() -> Status {
+    LIMN_TRY_STATUS(make_folder(file.parent_path()));
     if (!text.empty()) return write_file(file, text);
     std::error_code ignored;
     fs::remove(file, ignored);

@@ -14,16 +14,16 @@
 
 namespace limn::session {
 
-/// Keeps in the scene's folder what a session leaves there: looks with their images and an overview page
-/// (looks/), which marker carries which part (pairings.json), and answers about units
-/// (slots/SLOT/units.json). Files are changed on a thread of its own, in order; each file is either old or
-/// complete.
+/// Keeps what a session leaves of a scene: looks with their images and an overview page (looks/), which
+/// marker carries which part (pairings.json), both where scene/kept_files.h says, and answers about units
+/// (slots/SLOT/units.json in the scene's folder). Files are changed on a thread of its own, in order; each
+/// file is either old or complete.
 class ShowStore {
  public:
   /// `keeps`: false: nothing is written.
   explicit ShowStore(bool keeps);
 
-  /// The show state with the looks and pairings of the scene's folder. Damaged ones are reported in the log
+  /// The show state with the scene's looks and pairings. Damaged ones are reported in the log
   /// and not changed.
   static scene::ShowState loaded(const scene::Scene& scene, scene::ShowState show_state);
 

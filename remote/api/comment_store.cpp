@@ -2,8 +2,10 @@
 
 #include <algorithm>
 
+#include "core/file.h"
 #include "core/log.h"
 #include "remote/api/responses.h"
+#include "scene/kept_files.h"
 
 namespace limn::remote {
 namespace {
@@ -14,7 +16,7 @@ constexpr const char* k_comments_file = "comments.json";
 
 void CommentStore::load_once(const std::filesystem::path& scene_folder) {
   if (comments_) return;
-  comments_ = scene::load_comments(scene_folder / k_comments_file);
+  comments_ = scene::load_comments(scene::kept_file(scene_folder, k_comments_file));
   if (!*comments_) log_warning("live: {} Nobody can comment.", comments_->message());
 }
 
@@ -37,9 +39,11 @@ std::optional<HttpResponse> CommentStore::add(const AuthSessions::Guest& guest,
     return error_response(k_http_unavailable,
                           fmt::format("the project keeps {} comments at most.", all.size()));
   all.push_back(std::move(*comment));
-  const bool is_queued = worker_->add_job(
-      [post = post_, all, saved = std::move(saved), path = update->scene->folder / k_comments_file] {
-        const Status status = scene::save_comments(path, all);
+  const bool is_queued =
+      worker_->add_job([post = post_, all, saved = std::move(saved),
+                        path = scene::kept_folder(update->scene->folder) / k_comments_file] {
+        Status status = make_folder(path.parent_path());
+        if (status) status = scene::save_comments(path, all);
         post([saved, why = status ? "" : status.message()] { saved(why); });
       });
   if (!is_queued) {

@@ -21,8 +21,8 @@ namespace limn::remote {
 /// How many of a project's comments the state holds: the newest.
 constexpr std::size_t k_max_published_comments = 100;
 
-/// The comments of a project, in comments.json of the scene's folder. Belongs to the network's thread; files
-/// are written on the worker thread.
+/// The comments of a project, in comments.json where scene/kept_files.h says. Belongs to the network's
+/// thread; files are written on the worker thread.
 class CommentStore {
  public:
   /// Called on the network's thread when the comments are saved; `why` is empty, or says why they are not.

@@ -9,6 +9,7 @@
 #include "device/jpeg.h"
 #include "remote/api/responses.h"
 #include "scene/glb.h"
+#include "scene/kept_files.h"
 
 namespace limn::remote {
 namespace {
@@ -83,7 +84,7 @@ void SessionFiles::send_look_image(const std::string& path,
   if (!name || !update || !is_look())
     return respond(error_response(k_http_not_found, "expected a look of the state, found another name."));
   respond_from_worker(
-      [file = update->scene->folder / "looks" / (*name + ".png")] {
+      [file = scene::kept_file(update->scene->folder, std::filesystem::path("looks") / (*name + ".png"))] {
         auto png = read_file(file);
         return png ? uncached_response("image/png", std::move(*png))
                    : error_response(k_http_not_found, "this look has no picture.");
