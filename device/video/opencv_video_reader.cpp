@@ -1,5 +1,6 @@
 #include <opencv2/videoio.hpp>
 
+#include "core/program_library.h"
 #include "device/video_reader.h"
 
 namespace limn::device {
@@ -29,6 +30,8 @@ class OpenCvVideoReader : public VideoReader {
 
 }  // namespace
 }  // namespace limn::device
+
+LIMN_LIBRARY_VERSION(LIMN_VERSION)
 
 extern "C" __attribute__((visibility("default"))) limn::device::VideoReader* limn_make_video_reader() {
   return new limn::device::OpenCvVideoReader();

@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "core/program_library.h"
 #include "limn_room.h"
 #include "nodes/dds/domain_config.h"
 #include "nodes/dds/neighbourhood.h"
@@ -272,6 +273,8 @@ void DdsEngine::forget(const Sender& receiver) {
 
 }  // namespace
 }  // namespace limn::nodes
+
+LIMN_LIBRARY_VERSION(LIMN_VERSION)
 
 extern "C" __attribute__((visibility("default"))) limn::nodes::Engine* limn_make_room_engine(
     const limn::nodes::EngineOptions& options, limn::nodes::EngineEvents* events, std::string* problem) {
