@@ -30,6 +30,7 @@ OptionRow read_option(const CLI::Option& option) {
   row.present = option.get_default_str();
   if (row.present == "[]" || row.present == "\"\"") row.present.clear();
   row.may_repeat = option.get_items_expected_max() > 1;
+  row.has_commas = option.get_delimiter() == ',';
   return row;
 }
 

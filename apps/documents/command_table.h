@@ -12,7 +12,9 @@ struct OptionRow {
   std::vector<std::string> choices;  ///< the words that are accepted; empty: not a closed set
   std::string present;               ///< default; empty: none is stated
   std::string help;
-  bool is_required = false, may_repeat = false;
+  bool is_required = false;
+  bool may_repeat = false;  ///< may have several values: one word each, or the option again for each
+  bool has_commas = false;  ///< several values may be one word, separated by commas
 
   /// The longest name.
   const std::string& name() const { return names.back(); }

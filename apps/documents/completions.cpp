@@ -29,7 +29,9 @@ std::string in_quotes(const std::string& text, const char* quote = "'\\''") {
 // ---- bash
 
 std::string bash_value(const OptionRow& option) {
-  if (!option.choices.empty()) return fmt::format("_limn_words '{}'", fmt::join(option.choices, " "));
+  const std::string after_comma = option.has_commas ? "_limn_after_comma; " : "";
+  if (!option.choices.empty())
+    return after_comma + fmt::format("_limn_words '{}'", fmt::join(option.choices, " "));
   const ValueKind kind = value_kind(option.value);
   switch (kind.what) {
     case ValueKind::files:
@@ -37,20 +39,22 @@ std::string bash_value(const OptionRow& option) {
     case ValueKind::folders:
       return "_limn_folders";
     case ValueKind::known:
-      return "_limn_list " + kind.list;
+      return after_comma + "_limn_list " + kind.list;
     default:
       return ":";
   }
 }
 
 std::string bash_case(const CommandRow& command, const std::string& pattern) {
-  std::string values, options;
+  std::string values, options, lists;
   for (const OptionRow& option : command.options) {
     options += fmt::format("{} ", fmt::join(option.names, " "));
+    if (option.may_repeat) lists += fmt::format("{} ", fmt::join(option.names, " "));
     if (!option.value.empty())
       values += fmt::format("        {}) {}; return ;;\n", fmt::join(option.names, "|"), bash_value(option));
   }
   std::string text = fmt::format("    {})\n      options='{}'\n", pattern, options);
+  if (!lists.empty()) text += fmt::format("      _limn_list_option ' {}'\n", lists);
   if (!values.empty()) text += "      case $previous in\n" + values + "      esac\n";
   std::string rest = command.arguments.empty() ? "" : bash_value(command.arguments.front());
   if (!command.commands.empty())
@@ -132,7 +136,15 @@ std::string fish_value(const OptionRow& option) {
 
 std::string bash_completions(const CommandRow& table) {
   std::string text = k_note;
-  text += R"script(_limn_words() { COMPREPLY+=($(compgen -W "$1" -- "$word")); }
+  text += R"script(_limn_words() { COMPREPLY+=($(compgen -P "$done" -W "$1" -- "$word")); }
+# Of values that are separated by commas only the last one is completed.
+_limn_after_comma() { done=${word%"${word##*,}"} word=${word##*,}; }
+# A later value of an option that takes several words: the option is the last word with a hyphen.
+_limn_list_option() {
+  local at=$((${#words[@]} - 2))
+  while ((at > 1)) && [[ ${words[at]} != -* ]]; do ((at--)); done
+  [[ $word != -* && $1 == *" ${words[at]} "* ]] && previous=${words[at]}
+}
 _limn_folders() { compopt -o filenames 2>/dev/null; mapfile -t COMPREPLY < <(compgen -d -- "$word"); }
 # Files with one of these extensions (a|b), and folders.
 _limn_files() {
@@ -145,13 +157,14 @@ _limn_files() {
 _limn_list() { _limn_words "$("${words[0]}" complete "$1" "${words[@]:1}" 2>/dev/null)"; }
 _limn() {
   # Bash divides the line at "=", too, so it is divided again here.
-  local words word previous command options=''
+  local words word previous command options='' done=''
   read -ra words <<<"${COMP_LINE:0:COMP_POINT}"
   [[ ${COMP_LINE:0:COMP_POINT} == *' ' ]] && words+=('')
   word=${words[-1]} previous=${words[-2]} command=${words[1]}
   [[ $word == --*=* ]] && previous=${word%%=*} word=${word#*=}
   COMPREPLY=()
   _limn_candidates
+  word=$done$word
   [[ $word == *=* && $COMP_WORDBREAKS == *=* ]] && COMPREPLY=("${COMPREPLY[@]#"${word%=*}="}")
 }
 _limn_candidates() {

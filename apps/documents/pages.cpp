@@ -4,6 +4,11 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
 
 #include "apps/documents/command_table.h"
 #include "core/version.h"
@@ -89,15 +94,31 @@ std::string man_files(const CommandRow& command) {
       text += fmt::format(".TP\n\\fI{}\\fR\n{}\n", word, roff(meaning));
   }
   return text + ".TP\n\\fI~/.config/limn\\fR\n" +
-         roff("Settings, rooms and certificates of this user ($XDG_CONFIG_HOME/limn).") + "\n";
+         roff("Settings, rooms and certificates of this user ($XDG_CONFIG_HOME/limn).") +
+         "\n.TP\n\\fI~/.local/share/limn\\fR\n" +
+         roff("Looks, pairings and comments of scenes that this user cannot write ($XDG_DATA_HOME/limn).") +
+         "\n";
+}
+
+// The day of the release, so that two builds give the same pages: the one that SOURCE_DATE_EPOCH states
+// (reproducible-builds.org), else that of CHANGELOG.md; empty before a release.
+std::string document_date() {
+  const char* stated = std::getenv("SOURCE_DATE_EPOCH");
+  std::int64_t seconds = 0;
+  if (!stated || std::from_chars(stated, stated + std::strlen(stated), seconds).ec != std::errc())
+    return LIMN_RELEASED;
+  const std::chrono::sys_seconds moment{std::chrono::seconds(seconds)};
+  const std::chrono::year_month_day day(std::chrono::floor<std::chrono::days>(moment));
+  return fmt::format("{:04}-{:02}-{:02}", int(day.year()), unsigned(day.month()), unsigned(day.day()));
 }
 
 }  // namespace
 
 std::string man_page(const CommandRow& command, const CommandRow& table) {
   const std::string name = page_name(command.name);
-  std::string text = fmt::format(".TH \"{}\" 1 \"\" \"limn {}\" \"Limn\"\n.SH NAME\n{} \\- {}\n",
-                                 with_capitals(roff(name)), version(), roff(name), roff(command.summary));
+  std::string text = fmt::format(".TH \"{}\" 1 \"{}\" \"limn {}\" \"Limn\"\n.SH NAME\n{} \\- {}\n",
+                                 with_capitals(roff(name)), roff(document_date()), version(), roff(name),
+                                 roff(command.summary));
   text += fmt::format(".SH SYNOPSIS\n\\fB{}\\fR {}\n", roff(command.name), roff(synopsis(command)));
   text += fmt::format(".SH DESCRIPTION\n{}.\n", roff(command.summary));
   if (!command.details.empty()) text += ".PP\n" + roff(command.details) + "\n";

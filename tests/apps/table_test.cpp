@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <map>
 #include <regex>
@@ -99,6 +100,14 @@ TEST(Table, HelpOfACommandIsWhatItsHelpOptionPrints) {
   EXPECT_EQ(test::run_limn({"help", "bench", "calib"}).out, test::run_limn({"bench", "--help"}).out);
   EXPECT_EQ(test::run_limn({"help", "levitate"}).code, 2);
   EXPECT_EQ(test::run_limn({"help", "bench", "levitate"}).code, 2);
+}
+
+// Debian's tools state the time of the package's entry, so that two builds give the same pages.
+TEST(Table, AManualPageHasTheDateThatTheBuildStates) {
+  ::setenv("SOURCE_DATE_EPOCH", "1795780800", 1);
+  const std::string page = test::run_limn({"help", "--format", "man"}).out;
+  ::unsetenv("SOURCE_DATE_EPOCH");
+  EXPECT_TRUE(page.starts_with(".TH \"LIMN\" 1 \"2026\\-11\\-27\" \"limn ")) << page.substr(0, 60);
 }
 
 TEST(Table, EveryOptionIsInTheManualPageOfItsCommand) {
@@ -213,6 +222,15 @@ TEST_F(Completion, OfBashGivesWhatTheProgramKnows) {
   EXPECT_EQ(bash("simulate world.json --variants m"), "mirror=sport ");
   EXPECT_EQ(bash("simulate world.json --variants mirror="), "sport ");
   EXPECT_EQ(bash("bench tra"), "tracker ");
+}
+
+TEST_F(Completion, OfBashGivesLaterValuesOfAList) {
+  EXPECT_EQ(bash("detect b.png --family apriltag_16h5,apriltag_36"),
+            "apriltag_16h5,apriltag_36h10 apriltag_16h5,apriltag_36h11 ");
+  EXPECT_EQ(bash("detect b.png --family apriltag_16h5 apriltag_36"), "apriltag_36h10 apriltag_36h11 ");
+  EXPECT_EQ(bash("render --viewer a.json w"), "world.json ");
+  EXPECT_EQ(bash("render --viewer a.json --out s"), "scene ") << "another option came between";
+  EXPECT_EQ(bash("render --viewer a.json --composi"), "--composite ");
 }
 
 TEST_F(Completion, OfFishGivesCommandsOptionsAndValues) {
