@@ -12,9 +12,15 @@ Result<fs::path> folder_of(const char* variable, const char* in_home) {
   const char* named = std::getenv(variable);
   if (named && fs::path(named).is_absolute()) return fs::path(named) / "limn";
   const char* home = std::getenv("HOME");
-  if (home && *home) return fs::path(home) / in_home / "limn";
-  return error("expected a folder for Limn's own files, found neither {} nor HOME. Set one of them.",
-               variable);
+  if (!home || !*home)
+    return error("expected a folder for Limn's own files, found neither {} nor HOME. Set one of them.",
+                 variable);
+  std::error_code ignored;
+  if (!fs::is_directory(home, ignored))
+    return error(
+        "{}: expected the user's home folder (HOME), found none. Make it, or set {} to another folder.", home,
+        variable);
+  return fs::path(home) / in_home / "limn";
 }
 
 }  // namespace

@@ -478,8 +478,18 @@ TEST(FileCache, IsInTheUsersCacheFolder) {
   ::setenv("XDG_CACHE_HOME", "/somewhere", 1);
   EXPECT_EQ(user_cache_folder().value(), "/somewhere/limn");
   ::unsetenv("XDG_CACHE_HOME");
-  ::setenv("HOME", "/home/me", 1);
-  EXPECT_EQ(user_cache_folder().value(), "/home/me/.cache/limn");
+  const fs::path home = test::test_folder();
+  ::setenv("HOME", home.c_str(), 1);
+  EXPECT_EQ(user_cache_folder().value(), home / ".cache/limn");
+}
+
+TEST(UserFolder, AHomeThatDoesNotExistIsNamed) {
+  ::unsetenv("XDG_CONFIG_HOME");
+  ::setenv("HOME", "/nonexistent", 1);
+  const auto folder = user_folder();
+  ASSERT_FALSE(folder);
+  EXPECT_NE(folder.message().find("/nonexistent: expected the user's home folder"), std::string::npos)
+      << folder.message();
 }
 
 // A small file system, which only this thread sees.
