@@ -21,8 +21,8 @@ struct Jump {
 // Writes into memory of malloc(). It holds no objects with a destructor, because libjpeg may leave it by
 // longjmp. False: libjpeg failed, out of memory.
 bool write_jpeg(const cv::Mat& image, int quality, unsigned char** bytes, unsigned long* count) {
-  jpeg_compress_struct jpeg;
-  Jump jump;
+  jpeg_compress_struct jpeg{};
+  Jump jump{};
   jpeg.err = jpeg_std_error(&jump.manager);
   jump.manager.error_exit = [](j_common_ptr info) {
     std::longjmp(reinterpret_cast<Jump*>(info->err)->buffer, 1);
