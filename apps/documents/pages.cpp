@@ -88,8 +88,9 @@ std::string man_files(const CommandRow& command) {
       {"SCENE", "A scene: scene.json, and the meshes and looks that it names."},
       {"CAPTURES", "Captures: capture.json, patterns.json, poseNN/CAMERA/NNN.png."}};
   std::string text;
-  for (const auto& [word, meaning] : k_words) {
-    const auto has = [&](const OptionRow& option) { return option.value == word; };
+  for (const auto& entry : k_words) {
+    const auto& [word, meaning] = entry;
+    const auto has = [&entry](const OptionRow& option) { return option.value == entry.first; };
     if (std::ranges::any_of(command.options, has) || std::ranges::any_of(command.arguments, has))
       text += fmt::format(".TP\n\\fI{}\\fR\n{}\n", word, roff(meaning));
   }

@@ -69,7 +69,7 @@ std::string document(const std::string& format) { return test::run_limn({"help",
 std::string output_of(const std::string& command) {
   FILE* pipe = popen(command.c_str(), "r");
   std::string text;
-  std::array<char, 4096> part;
+  std::array<char, 4096> part{};
   while (const std::size_t count = std::fread(part.data(), 1, part.size(), pipe))
     text.append(part.data(), count);
   pclose(pipe);
