@@ -232,6 +232,8 @@ void check(const Health& health, MessageCheck* to) {
                         health.clock_stddev_s});
   to->count("problems", health.problems);
   for (const std::string& problem : health.problems) to->text("problems", problem, k_longest_text);
+  to->count("refreshes", health.refreshes);
+  for (const Refresh& refresh : health.refreshes) to->finite("refreshes", {refresh.period_s});
 }
 
 void check(const Departure& /*departure*/, MessageCheck* to) {

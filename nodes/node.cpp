@@ -160,11 +160,12 @@ class NodeLoop {
     if (reported_s >= 0 && reported_s < k_health_every_s) return;
     reported_at_ = now();
     Health health;
-    if (const auto clock = room_->host_clock()) {
+    const std::optional<ClockEstimate> clock = room_->host_clock();
+    if (clock) {
       health.clock_offset_s = 1e-9 * static_cast<double>(clock->offset.count());
       health.clock_stddev_s = clock->stddev_s;
     }
-    if (frames_) frames_->report(&health);
+    if (frames_) frames_->report(clock, &health);
     if (!problem_.empty()) health.problems.push_back(problem_);
     if (const Status sent = room_->send(health); !sent) log_warning("node: {}", sent.message());
   }

@@ -95,13 +95,15 @@ void NodeFrames::dim(double share) {
   }
 }
 
-void NodeFrames::report(Health* health) const {
+void NodeFrames::report(const std::optional<ClockEstimate>& clock, Health* health) const {
   health->shown = shown_;
   health->missed = missed_;
   health->draw_ms = median(std::vector<double>(draw_ms_.begin(), draw_ms_.end()));
   health->late_ms = late_ms_;
   for (const Output& output : outputs_) {
     health->latency_s = std::max(health->latency_s, output.schedule.latency_s());
+    if (const auto period_s = output.schedule.refresh_s(); period_s && clock)
+      health->refreshes.push_back({clock->to_other(output.schedule.last_shown_at()), *period_s});
     if (!output.problem.empty()) health->problems.push_back(output.problem);
   }
 }

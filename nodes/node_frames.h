@@ -35,8 +35,8 @@ class NodeFrames {
     return setup_.run == run && setup_.revision == revision;
   }
   bool has_projectors() const { return !outputs_.empty(); }
-  /// Copies what it knows of frames and displays.
-  void report(Health* health) const;
+  /// Copies what it knows of frames and displays. `clock`: the host's.
+  void report(const std::optional<ClockEstimate>& clock, Health* health) const;
 
  private:
   struct Output {

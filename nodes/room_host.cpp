@@ -7,6 +7,7 @@
 
 #include "core/log.h"
 #include "core/names.h"
+#include "nodes/refresh.h"
 
 namespace limn::nodes {
 namespace {
@@ -102,6 +103,14 @@ void RoomHost::publish_state(const session::SessionMoment& moment) {
                         [files = files_, setup = moment.session.setup(), folder = folder_of(revisions_)] {
                           return shared_files(files, setup, folder);
                         });
+}
+
+Stamp RoomHost::light_at(Stamp expected) const {
+  std::vector<Refresh> refreshes;
+  for (const Machine& machine : room_->machines())
+    if (machine.health && nodes_.contains(machine.sender.node))
+      refreshes.insert(refreshes.end(), machine.health->refreshes.begin(), machine.health->refreshes.end());
+  return refresh_near(expected, refreshes);
 }
 
 void RoomHost::log_images(const session::Session& session, Stamp at) {

@@ -39,6 +39,8 @@ class RoomHost final : public session::SessionClient {
   void apply_edits(const session::SessionMoment& moment) override;
   void note_description(const session::FrameDescription& frame) override;
   void publish_state(const session::SessionMoment& moment) override;
+  /// A refresh of the displays at nodes.
+  Stamp light_at(Stamp expected) const override;
 
  private:
   RoomHost(Room* room, FileOffer* files, std::string devices, std::filesystem::path work, AppendLog log)

@@ -180,6 +180,24 @@ TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
   }
 }
 
+TEST_F(NodeTest, FramesArePlannedForTheRefreshOfANodesDisplay) {
+  open_host();
+  const Stamp refreshed_at = now(), expected = shifted(refreshed_at, 0.207);
+  EXPECT_EQ(client_->light_at(expected), expected);
+  test::MemoryLink left(&room_, "left"), stranger(&room_, "stranger");
+  for (test::MemoryLink* link : {&left, &stranger}) ASSERT_TRUE(link->send(Offer{}));
+  Health health;
+  health.refreshes = {{shifted(refreshed_at, 0.005), 0.02}};
+  ASSERT_TRUE(stranger.send(health));  // none of the session's displays are there
+  health.refreshes = {{refreshed_at, 0.02}};
+  ASSERT_TRUE(left.send(health));
+  ASSERT_TRUE(holds_within(5s, [&] {
+    const auto machine = host_->find("left");
+    return machine && machine->health;
+  }));
+  EXPECT_NEAR(seconds_between(refreshed_at, client_->light_at(expected)), 0.22, 1e-6);
+}
+
 TEST_F(NodeTest, ShowsAndGrabsForACalibration) {
   const cv::Mat image(48, 64, CV_8UC3, cv::Scalar(10, 20, 30));
   fs::create_directories(folder_ / "images");
