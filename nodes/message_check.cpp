@@ -97,6 +97,7 @@ void check(const scene::PosedScene& posed, MessageCheck* to) {
 void check(const Track& track, MessageCheck* to) {
   to->text("track.body", track.body);
   to->pose("track", track.world_from_body);
+  // Its lower triangle travels (to_wire.cpp), so what arrives is symmetric.
   to->finite_matrix("track.covariance", track.covariance);
   to->finite("track.rms_px", {track.rms_px});
 }
