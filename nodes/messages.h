@@ -128,6 +128,7 @@ struct Health {
   double clock_offset_s = 0;  ///< host clock minus the node's
   double clock_stddev_s = 0;
   std::vector<std::string> problems;  ///< sentences for people; empty: all is well
+  bool has_no_host = false;           ///< it has been in the room for long enough to know
   std::vector<Refresh> refreshes;     ///< of its projectors, as far as they are known
 };
 

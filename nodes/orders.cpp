@@ -35,10 +35,12 @@ Status open_display(const Order& order, NodeDisplays* devices, Answer* answer) {
   return {};
 }
 
-Status show(const Order& order, const ClockEstimate& clock, NodeDisplays* devices, Answer* answer) {
+Status show(const Order& order,
+            const cv::Mat& image,
+            const ClockEstimate& clock,
+            NodeDisplays* devices,
+            Answer* answer) {
   LIMN_TRY(device::Display * display, display_of(order, devices));
-  const cv::Mat bytes(1, static_cast<int>(order.image.size()), CV_8U, const_cast<char*>(order.image.data()));
-  const cv::Mat image = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
   if (image.empty())
     return error("expected a PNG image to show, found {} bytes of something else.", order.image.size());
   LIMN_TRY(const Stamp shown_at, display->show(image));
@@ -94,11 +96,20 @@ bool is_for_camera(const Order& order) {
   return order.what == open_camera || order.what == grab;
 }
 
-Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeDisplays* displays) {
+cv::Mat image_of(const Order& order) {
+  if (order.image.empty()) return {};
+  const cv::Mat bytes(1, static_cast<int>(order.image.size()), CV_8U, const_cast<char*>(order.image.data()));
+  return cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
+}
+
+Answer carried_out(const Order& order,
+                   const cv::Mat& image,
+                   const std::optional<ClockEstimate>& clock,
+                   NodeDisplays* displays) {
   return answer_to(order, [&](Answer* answer) -> Status {
     if (order.what == Order::What::open_display) return open_display(order, displays, answer);
     if (order.what == Order::What::show)
-      return clock ? show(order, *clock, displays, answer) : Status(no_clock());
+      return clock ? show(order, image, *clock, displays, answer) : Status(no_clock());
     return unknown(order);
   });
 }

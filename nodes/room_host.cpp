@@ -68,10 +68,22 @@ void RoomHost::note_description(const session::FrameDescription& frame) {
   Moment moment{revisions_, frame};
   moment.frame.number = ++frames_;  // a composer counts anew after a change of the scene
   if (const Status sent = room_->send(moment); !sent) log_warning("room: {}", sent.message());
+  last_ = std::move(moment.frame);
+}
+
+// Light that must go off does not wait until the next frame is described. That one, which is black too, has
+// the same number.
+void RoomHost::send_black() {
+  Moment moment{revisions_, last_};
+  moment.frame.number = frames_ + 1;
+  moment.frame.is_black = last_.is_black = true;
+  moment.frame.shown_at = now();
+  if (const Status sent = room_->send(moment); !sent) log_warning("room: {}", sent.message());
 }
 
 // Tells people which machines come, go and fail.
 void RoomHost::apply_edits(const session::SessionMoment& moment) {
+  if (moment.session.show_state().blackout && frames_ > 0 && !last_.is_black) send_black();
   std::set<std::string> problems;
   for (const std::string& name : nodes_) {
     const std::optional<Machine> node = room_->find(name);
@@ -124,14 +136,19 @@ void RoomHost::log_images(const session::Session& session, Stamp at) {
 }
 
 Status check_no_other_host(const Room& room, double wait_s) {
+  constexpr double k_least_s = 0.3;
   const Stamp begun = now();
-  while (seconds_between(begun, now()) < wait_s) {
+  const auto has_no_host = [](const Machine& machine) {
+    return machine.health && machine.health->has_no_host;
+  };
+  for (double waited_s = 0; waited_s < wait_s; waited_s = seconds_between(begun, now())) {
     if (const auto host = room.host())
       return error(
           "room: expected no host in it, found {}. A room has one host: end limn live or limn calibrate "
           "there, or "
           "start limn node here.",
           host->sender.node);
+    if (waited_s > k_least_s && std::ranges::any_of(room.machines(), has_no_host)) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   return {};

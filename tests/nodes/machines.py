@@ -49,6 +49,13 @@ class Network:
     def in_switch(self, *command):
         run("ip", "netns", "exec", self.switch, *command)
 
+    def limit(self, megabits):
+        """Every machine's cable carries so much, and queues at most 50 ms of it."""
+        shape = ["root", "tbf", "rate", f"{megabits}mbit", "burst", "32kb", "latency", "50ms"]
+        for number, name in enumerate(self.machines, 1):
+            self.in_switch("tc", "qdisc", "add", "dev", f"p{number}", *shape)
+            run("ip", "netns", "exec", self.names[name], "tc", "qdisc", "add", "dev", "eth0", *shape)
+
     def plug(self, name, is_plugged):
         self.in_switch("ip", "link", "set", f"p{self.machines.index(name) + 1}", "up" if is_plugged else "down")
 
@@ -166,14 +173,16 @@ class Machines:
         self.programs.append(program)
         return program
 
-    def start_node(self, name, run_number=0, clock_ahead_s=100, extra=()):
-        return self.start(name, [self.limn, "node", "--join", "studio", "--name", name, "--out",
+    def start_node(self, name, run_number=0, clock_ahead_s=100, extra=(), cache=None):
+        """With `cache`, a folder, the node does not share its files with the other nodes here."""
+        own = ["env", f"XDG_CACHE_HOME={cache}"] if cache else []
+        return self.start(name, [*own, self.limn, "node", "--join", "studio", "--name", name, "--out",
                                  self.folder / f"{name}-{run_number}", *extra], clock_ahead_s)
 
-    def start_host(self, seconds, out="host", extra=()):
+    def start_host(self, seconds, out="host", extra=(), scene="recording/scene"):
         return self.start("host", [self.limn, "live", "--room", "studio", "--name", "host", "--devices",
                                    self.folder / "devices.json", "--rig", self.folder / "recording/rig", "--scene",
-                                   self.folder / "recording/scene", "--seconds", seconds, "--out",
+                                   self.folder / scene, "--seconds", seconds, "--out",
                                    self.folder / out, *extra])
 
     def set_clock(self, name, drift=0.0, step_s=0.0):

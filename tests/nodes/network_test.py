@@ -8,6 +8,8 @@ Exit code 77: namespaces are not permitted here.
 """
 
 import argparse
+import bisect
+import csv
 import os
 import subprocess
 import sys
@@ -17,6 +19,29 @@ from pathlib import Path
 import failures
 from machines import (NODES, PREFIX, LossyNetwork, Machines, Network, NetworkOfVersion6, NetworkWithoutMulticast,
                       fingerprints, prepare, rows_in, run, send_osc, shown, wait_for)
+
+
+def placement_mm(poses, path, slot="mirror"):
+    """How far the light of a part is from where the host says that it belongs at each moment, RMS: an image stays until
+    the next one is shown. Both on the host's clock."""
+    with open(poses) as file:
+        belongs = [(float(row["shown_at_s"]), [float(row[axis]) for axis in ("x_mm", "y_mm", "z_mm")])
+                   for row in csv.DictReader(file) if row["slot"] == slot]
+    times = [at for at, _ in belongs]
+
+    def place(at_s):
+        after = min(max(bisect.bisect_left(times, at_s), 1), len(times) - 1)
+        (t0, p0), (t1, p1) = belongs[after - 1], belongs[after]
+        share = (at_s - t0) / (t1 - t0)
+        return [a + share * (b - a) for a, b in zip(p0, p1)]
+
+    rows = [(int(row["shown_at_ns"]) / 1e9, place(int(row["wanted_at_ns"]) / 1e9)) for row in shown(path)[10:]]
+    squares = []
+    for (from_s, drawn), (until_s, _) in zip(rows, rows[1:]):
+        for step in range(int((until_s - from_s) / 0.002)):
+            at_s = from_s + 0.002 * step
+            squares.append(sum((a - b) ** 2 for a, b in zip(place(at_s), drawn)))
+    return (sum(squares) / len(squares)) ** 0.5
 
 
 def images_are_the_hosts(machines):
@@ -36,6 +61,8 @@ def images_are_the_hosts(machines):
         late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows[10:])
         print(f"{node}: {len(rows)} images equal; from the wanted moment: median {late_ms[len(late_ms) // 2]:.2f} ms, "
               f"99 % {late_ms[int(0.99 * len(late_ms))]:.2f} ms")
+    return {f"placement at {node}, RMS, mm": placement_mm(machines.folder / "host/poses.csv", path)
+            for node, path in zip(NODES, paths)}
 
 
 def nobody_freezes_on_a_bad_network(machines):
@@ -56,6 +83,8 @@ def nobody_freezes_on_a_bad_network(machines):
         described = int(rows[-1]["frame"]) - int(rows[5]["frame"])
         print(f"{node}: {len(rows) - 6} of {described} frames shown, the longest pause {max(pauses):.2f} s")
         assert len(rows) - 6 > 0.5 * described and max(pauses) < 1.5, (len(rows), described, max(pauses))
+    return {f"placement at {node}, RMS, mm": placement_mm(machines.folder / "host/poses.csv", path)
+            for node, path in zip(NODES, paths)}
 
 
 nobody_freezes_on_a_bad_network.network = LossyNetwork
@@ -159,7 +188,8 @@ SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_mee
              machines_meet_by_ipv6, *failures.SCENARIOS,
              a_blackout_reaches_all_and_one_recording_replays_the_room, a_second_host_is_refused]
 
-BY_NAME = [a_thousand_frames_of_three_nodes]  # long ones
+BY_NAME = [a_thousand_frames_of_three_nodes, failures.a_node_sleeps,
+           failures.a_large_scene_comes_while_frames_run]  # long ones
 
 
 def run_once(scenario, run_number, arguments):

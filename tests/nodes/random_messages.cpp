@@ -146,7 +146,7 @@ void fields(F& f, Refresh& x) {
 template <class F>
 void fields(F& f, Health& x) {
   f(x.shown), f(x.missed), f(x.latency_s), f(x.draw_ms), f(x.late_ms), f(x.clock_offset_s),
-      f(x.clock_stddev_s), f(x.problems), f(x.refreshes);
+      f(x.clock_stddev_s), f(x.problems), f(x.has_no_host), f(x.refreshes);
 }
 template <class F>
 void fields(F& /*f*/, Departure& /*x*/) {}
