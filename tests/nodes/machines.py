@@ -215,13 +215,16 @@ def shown(path):
         return list(csv.DictReader(file))
 
 
-def prepare(limn, folder, world="studio", nodes=NODES, images=3000):
+def prepare(limn, folder, world="studio", nodes=NODES, swaying=None, images=3000):
     """A recorded session in a world of config/, whose camera images the host plays again and again, and devices whose
-    projectors are plugged into the nodes in turn."""
+    projectors are plugged into the nodes in turn. `swaying`: a marker that moves by 50 mm to both sides in a second."""
     environment = dict(os.environ, HOME=str(folder / "home"), XDG_CONFIG_HOME=str(folder / "config"))
     path = Path(__file__).resolve().parents[2] / f"config/worlds/{world}.json"
-    subprocess.run([limn, "live", "--world", path, "--resolution", "0.25", "--seconds", "1", "--record", folder / "recording"],
-                   check=True, env=environment, capture_output=True)
+    sway = {"at_s": 0, "until_s": 9, "sway": swaying, "amplitude_m": [0.05, 0, 0], "hz": 1}
+    script = {"schema": "limn.script/1", "seconds": 1, "events": [sway] if swaying else []}
+    (folder / "script.json").write_text(json.dumps(script))
+    subprocess.run([limn, "live", "--world", path, "--resolution", "0.25", "--script", folder / "script.json", "--record",
+                    folder / "recording"], check=True, env=environment, capture_output=True)
     recorded = sorted((folder / "recording/frames/camera0").iterdir())
     film = folder / "film"
     film.mkdir()

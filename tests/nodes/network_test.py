@@ -22,8 +22,8 @@ from machines import (NODES, PREFIX, LossyNetwork, Machines, Network, NetworkOfV
 
 
 def placement_mm(poses, path, slot="mirror"):
-    """How far the light of a part is from where the host says that it belongs at each moment, RMS: an image stays until
-    the next one is shown. Both on the host's clock."""
+    """How far the light of a part is from where the host says that it belongs at each moment, RMS: at a node, and at an
+    ideal one, which shows every frame at its moment. An image stays until the next one. All on the host's clock."""
     with open(poses) as file:
         belongs = [(float(row["shown_at_s"]), [float(row[axis]) for axis in ("x_mm", "y_mm", "z_mm")])
                    for row in csv.DictReader(file) if row["slot"] == slot]
@@ -35,13 +35,17 @@ def placement_mm(poses, path, slot="mirror"):
         share = (at_s - t0) / (t1 - t0)
         return [a + share * (b - a) for a, b in zip(p0, p1)]
 
-    rows = [(int(row["shown_at_ns"]) / 1e9, place(int(row["wanted_at_ns"]) / 1e9)) for row in shown(path)[10:]]
-    squares = []
-    for (from_s, drawn), (until_s, _) in zip(rows, rows[1:]):
-        for step in range(int((until_s - from_s) / 0.002)):
-            at_s = from_s + 0.002 * step
-            squares.append(sum((a - b) ** 2 for a, b in zip(place(at_s), drawn)))
-    return (sum(squares) / len(squares)) ** 0.5
+    def rms(lights, begin_s, end_s):
+        squares = []
+        for (from_s, drawn), (until_s, _) in zip(lights, lights[1:]):
+            for step in range(int((min(until_s, end_s) - max(from_s, begin_s)) / 0.002)):
+                there = place(max(from_s, begin_s) + 0.002 * step)
+                squares.append(sum((a - b) ** 2 for a, b in zip(there, drawn)))
+        return (sum(squares) / len(squares)) ** 0.5
+
+    at_node = [(int(row["shown_at_ns"]) / 1e9, place(int(row["wanted_at_ns"]) / 1e9)) for row in shown(path)[10:]]
+    limits = at_node[0][0], at_node[-1][0]
+    return rms(at_node, *limits), rms(belongs, *limits)
 
 
 def images_are_the_hosts(machines):
@@ -61,8 +65,6 @@ def images_are_the_hosts(machines):
         late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows[10:])
         print(f"{node}: {len(rows)} images equal; from the wanted moment: median {late_ms[len(late_ms) // 2]:.2f} ms, "
               f"99 % {late_ms[int(0.99 * len(late_ms))]:.2f} ms")
-    return {f"placement at {node}, RMS, mm": placement_mm(machines.folder / "host/poses.csv", path)
-            for node, path in zip(NODES, paths)}
 
 
 def nobody_freezes_on_a_bad_network(machines):
@@ -83,11 +85,35 @@ def nobody_freezes_on_a_bad_network(machines):
         described = int(rows[-1]["frame"]) - int(rows[5]["frame"])
         print(f"{node}: {len(rows) - 6} of {described} frames shown, the longest pause {max(pauses):.2f} s")
         assert len(rows) - 6 > 0.5 * described and max(pauses) < 1.5, (len(rows), described, max(pauses))
-    return {f"placement at {node}, RMS, mm": placement_mm(machines.folder / "host/poses.csv", path)
-            for node, path in zip(NODES, paths)}
 
 
 nobody_freezes_on_a_bad_network.network = LossyNetwork
+
+
+def placement_on_a_network(machines):
+    """A part that sways by 50 mm in a second; on this network and on one that delays and loses packets."""
+    for node in NODES:
+        machines.start_node(node)
+    host = machines.start_host(0)
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    wait_for(90, lambda: all(rows_in(path) > 150 for path in paths), "the nodes show images")
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    numbers = {}
+    for node, path in zip(NODES, paths):
+        at_node_mm, ideal_mm = placement_mm(machines.folder / "host/poses.csv", path)
+        numbers[f"placement at {node}, RMS, mm"] = at_node_mm
+        numbers[f"of an ideal node, of {node}'s time, RMS, mm"] = ideal_mm
+        numbers[f"ratio of {node}"] = at_node_mm / ideal_mm
+    return numbers
+
+
+def placement_on_a_bad_network(machines):
+    return placement_on_a_network(machines)
+
+
+placement_on_a_bad_network.network = LossyNetwork
+placement_on_a_network.swaying = placement_on_a_bad_network.swaying = "aruco_4x4_50:0"
 
 
 def meet(machines, extra=()):
@@ -140,6 +166,33 @@ def a_blackout_reaches_all_and_one_recording_replays_the_room(machines):
     return {**black_s, **equal}
 
 
+def twenty_blackouts(machines):
+    """Blackout on and off, 20 times in one session: until both nodes are black."""
+    for node in NODES:
+        machines.start_node(node)
+    host = machines.start_host(0, extra=["--osc", "9000"])
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    wait_for(60, lambda: all(rows_in(path) > 60 for path in paths), "the nodes show images")
+    sent = []
+    for number in range(20):
+        sent.append(send_osc(machines, "host", "/limn/blackout", "on"))
+        time.sleep(0.5)
+        send_osc(machines, "host", "/limn/blackout", "off")
+        time.sleep(0.5 + 0.013 * number)  # at another moment of a frame each time
+    send_osc(machines, "host", "/limn/blackout", "on")
+    time.sleep(1)
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    black_s = []
+    for path in paths:
+        rows = shown(path)
+        black = rows[-1]["fingerprint"]
+        at = [int(row["shown_at_ns"]) for row in rows if row["fingerprint"] == black]
+        black_s.append([(min(at_ns for at_ns in at if at_ns > sent_ns) - sent_ns) / 1e9 for sent_ns in sent])
+    both_s = sorted(max(pair) for pair in zip(*black_s))
+    return {"both nodes black, median of 20, s": both_s[10], "worst, s": both_s[-1]}
+
+
 def a_thousand_frames_of_three_nodes(machines):
     """Three nodes with four projectors, whose clocks are 100 s apart and drift by 50 ppm against each other."""
     nodes = machines.nodes
@@ -188,7 +241,7 @@ SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_mee
              machines_meet_by_ipv6, *failures.SCENARIOS,
              a_blackout_reaches_all_and_one_recording_replays_the_room, a_second_host_is_refused]
 
-BY_NAME = [a_thousand_frames_of_three_nodes, failures.a_node_sleeps,
+BY_NAME = [twenty_blackouts, a_thousand_frames_of_three_nodes, placement_on_a_network, placement_on_a_bad_network, failures.a_node_sleeps,
            failures.a_large_scene_comes_while_frames_run]  # long ones
 
 
@@ -198,10 +251,11 @@ def run_once(scenario, run_number, arguments):
     subprocess.run(["rm", "-rf", place], check=True)
     place.mkdir(parents=True)
     nodes, world = getattr(scenario, "nodes", NODES), getattr(scenario, "world", "studio")
-    prepared = arguments.folder.resolve() / f"prepared-{world}"
+    swaying = getattr(scenario, "swaying", None)
+    prepared = arguments.folder.resolve() / f"prepared-{world}{'-swaying' if swaying else ''}"
     if not prepared.exists():
         prepared.mkdir()
-        prepare(arguments.limn.resolve(), prepared, world, nodes)
+        prepare(arguments.limn.resolve(), prepared, world, nodes, swaying)
     for path in prepared.iterdir():
         (place / path.name).symlink_to(path)
     network = getattr(scenario, "network", Network)(["host", *nodes])
