@@ -22,9 +22,11 @@
 #include <vector>
 
 #include "nodes/display_schedule.h"
+#include "nodes/file_server.h"
 #include "nodes/refresh.h"
 #include "nodes/room.h"
 #include "nodes/room_keys.h"
+#include "nodes/shared_files.h"
 
 namespace limn::nodes {
 namespace {
@@ -38,6 +40,7 @@ struct BenchOptions {
   double seconds = 8;
   double rate_hz = 60;
   bool is_aligned = true;  // the host chooses moments at which displays refresh
+  double files_mb = 0;     // of a scene that the first node fetches meanwhile
 };
 
 constexpr double k_refresh_s = 1 / 60.0, k_electronics_s = 5e-3;
@@ -117,6 +120,15 @@ Result<std::unique_ptr<Room>> entered(const fs::path& room, const std::string& n
   return std::make_unique<Room>(std::move(link));
 }
 
+// Fetches the host's files, once the moments have come for a while; writes how long it took.
+void fetch_files(const Setup& setup, const Offer& host, const fs::path& room) {
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  const auto begun = Clock::now();
+  const Status fetched = fetch_from_host(room / "cache")(setup, host, room / "fetched");
+  if (!fetched) fmt::print(stderr, "{}\n", fetched.message());
+  std::ofstream(room / "files") << std::chrono::duration<double>(Clock::now() - begun).count();
+}
+
 // Runs a node until the bench creates the file `end`. A moment's painted_at is when it was sent.
 int run_node(const fs::path& room, const BenchOptions& options, int number) {
   auto node = entered(room, fmt::format("node{}", number), false);
@@ -128,8 +140,13 @@ int run_node(const fs::path& room, const BenchOptions& options, int number) {
   std::vector<double> delays_ms;
   SimulatedDisplay display(room / fmt::format("light-{}", number));
   Clock::time_point reported_at;
+  std::jthread fetching;
   while (!fs::exists(room / "end")) {
     (*node)->wait(std::chrono::milliseconds(20));
+    const auto host = (*node)->host();
+    if (const auto setup = number == 0 ? (*node)->take_setup() : std::nullopt; setup && !setup->files.empty())
+      fetching =
+          std::jthread([setup = *setup, offer = host->offer, room] { fetch_files(setup, offer, room); });
     if (const auto moment = (*node)->take_moment()) {
       delays_ms.push_back(1e3 * seconds_between(moment->frame.painted_at, now()));
       display.show(moment->frame, (*node)->host_clock());
@@ -213,8 +230,19 @@ Light read_light(const fs::path& room, int nodes) {
 
 Status measure(const fs::path& room, const BenchOptions& options) {
   LIMN_TRY(const std::unique_ptr<Room> host, entered(room, "host", true));
-  LIMN_TRY_STATUS(host->offer({.is_host = true, .version = "bench"}));
-  LIMN_TRY_STATUS(host->send(Setup{.revision = 1}));
+  LIMN_TRY(const std::unique_ptr<FileServer> server, FileServer::open());
+  Setup setup{.revision = 1};
+  if (options.files_mb > 0) {
+    const fs::path scene = room / "session/scene";
+    fs::create_directories(scene);
+    std::ofstream(scene / "mesh.bin") << std::string(static_cast<std::size_t>(1e6 * options.files_mb), 'x');
+    LIMN_TRY(setup.files, server->share(room / "session"));
+  }
+  LIMN_TRY_STATUS(host->offer({.is_host = true,
+                               .version = "bench",
+                               .servers = server->servers(),
+                               .fingerprint = server->fingerprint(),
+                               .token = server->token()}));
   const auto begun = Clock::now();
   while (static_cast<int>(host->machines().size()) < options.nodes) {
     if (Clock::now() - begun > std::chrono::seconds(60))
@@ -223,6 +251,7 @@ Status measure(const fs::path& room, const BenchOptions& options) {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   const double found_s = std::chrono::duration<double>(Clock::now() - begun).count();
+  LIMN_TRY_STATUS(host->send(setup));
   std::this_thread::sleep_for(std::chrono::seconds(2));
 
   Moment moment{1, busy_frame(options.nodes * options.projectors)};
@@ -268,6 +297,10 @@ Status measure(const fs::path& room, const BenchOptions& options) {
       (packets - packets_before) / took_s, quantile(delays, 0.5), quantile(delays, 0.99),
       received / options.nodes / frames, least / frames, late, quantile(light.from_wanted_ms, 0.5),
       quantile(light.from_wanted_ms, 0.99), quantile(light.skew_ms, 0.5), quantile(light.skew_ms, 0.99));
+  double files_s = 0;
+  if (std::ifstream(room / "files") >> files_s)
+    fmt::print("      meanwhile {:.0f} MB of files came to the first node in {:.1f} s\n", options.files_mb,
+               files_s);
   return {};
 }
 
@@ -280,6 +313,7 @@ int run(int argc, char** argv) {
   app.add_option("--projectors", options.projectors, "Projectors of each node")->capture_default_str();
   app.add_option("--seconds", options.seconds, "Length of each measurement")->capture_default_str();
   app.add_option("--rate", options.rate_hz, "Moments in a second")->capture_default_str();
+  app.add_option("--files", options.files_mb, "MB of a scene that the first node fetches meanwhile");
   bool is_unaligned = false;
   app.add_flag("--unaligned", is_unaligned, "The host takes no notice of the displays' refreshes");
   CLI11_PARSE(app, argc, argv);
