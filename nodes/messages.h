@@ -129,7 +129,7 @@ struct Health {
   double clock_stddev_s = 0;
   std::vector<std::string> problems;  ///< sentences for people; empty: all is well
   bool has_no_host = false;           ///< it has been in the room for long enough to know
-  std::vector<Refresh> refreshes;     ///< of its projectors, as far as they are known
+  std::vector<Refresh> refreshes;     ///< those of its projectors that are known
 };
 
 /// The sender has gone: it said so, or was not heard for as long as its liveliness lasts. Made by the link.

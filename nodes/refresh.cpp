@@ -10,10 +10,10 @@ namespace {
 constexpr double k_shortest_s = 1 / 500.0, k_longest_s = 1 / 10.0;  // periods that displays have
 constexpr double k_oldest_refresh_s = 2;    // later a refresh says nothing of the phase any more
 constexpr double k_same_rate = 0.02;        // relative difference of periods that count as one
-constexpr double k_early_share = 0.25;      // of a period
+constexpr double k_early_share = 0.25;      // share of a period by which it may be earlier than expected
 constexpr double k_least_agreement = 0.05;  // with less the phases are all round the period
 
-// Of any stamps, also those whose difference overflows.
+// Any two stamps have one, also those whose difference overflows.
 double distance_s(Stamp from, Stamp to) {
   const auto ns = [](Stamp at) { return static_cast<double>(at.time_since_epoch().count()); };
   return 1e-9 * (ns(to) - ns(from));
