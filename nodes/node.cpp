@@ -143,10 +143,10 @@ class NodeLoop {
 
   // Orders that come before the clocks are compared wait for that.
   void carry_out_orders() {
-    for (auto& [order, host] : room_->take_orders()) {
+    for (Room::ReceivedOrder& received : room_->take_orders()) {
       std::future<cv::Mat> image = std::async(is_drawing() ? std::launch::async : std::launch::deferred,
-                                              [order] { return image_of(order); });
-      orders_.push_back({std::move(order), std::move(host), std::move(image)});
+                                              [order = received.order] { return image_of(order); });
+      orders_.push_back({std::move(received.order), std::move(received.host), std::move(image)});
     }
     if (orders_.empty()) waits_since_.reset();
     if (!orders_.empty() && !waits_since_) waits_since_ = now();

@@ -173,6 +173,12 @@ TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
                   Pose(rig_.world().world_from_prototype.rotation,
                        rig_.world().world_from_prototype.translation + Eigen::Vector3d(1e-3 * i, 0, 0)));
         send();
+        if (i == 5) {  // an order between two frames
+          const auto screen =
+              RoomOpener(host_.get(), nullptr).display(offscreen("screen0", "left", {64, 48}));
+          ASSERT_TRUE(screen) << screen.message();
+          EXPECT_TRUE((*screen)->show(cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 20, 30))));
+        }
         std::this_thread::sleep_for(100ms);
       }
     }
