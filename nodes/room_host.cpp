@@ -141,14 +141,14 @@ Status check_no_other_host(const Room& room, double wait_s) {
   const auto has_no_host = [](const Machine& machine) {
     return machine.health && machine.health->has_no_host;
   };
-  for (double waited_s = 0; waited_s < wait_s; waited_s = seconds_between(begun, now())) {
+  while (seconds_between(begun, now()) < wait_s) {
     if (const auto host = room.host())
       return error(
           "room: expected no host in it, found {}. A room has one host: end limn live or limn calibrate "
           "there, or "
           "start limn node here.",
           host->sender.node);
-    if (waited_s > k_least_s && std::ranges::any_of(room.machines(), has_no_host)) break;
+    if (seconds_between(begun, now()) > k_least_s && std::ranges::any_of(room.machines(), has_no_host)) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   return {};

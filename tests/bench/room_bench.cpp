@@ -11,6 +11,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdio>
+#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -348,4 +350,9 @@ int run(int argc, char** argv) {
 }  // namespace
 }  // namespace limn::nodes
 
-int main(int argc, char** argv) { return limn::nodes::run(argc, argv); }
+int main(int argc, char** argv) try {
+  return limn::nodes::run(argc, argv);
+} catch (const std::exception& problem) {
+  std::fprintf(stderr, "%s\n", problem.what());
+  return 1;
+}
