@@ -328,15 +328,19 @@ session::SessionDevices opened(const device::Devices& devices, const Rig& rig, d
     out.cameras.push_back(camera ? std::move(*camera) : nullptr);
   }
   out.projectors.resize(rig.projectors.size());
+  out.latency_s.resize(rig.projectors.size());
   for (const device::DisplayConfig& wanted : devices.displays) {
     auto display = opener->display(wanted);
     const Imager* projector = find_named(rig.projectors, wanted.name);
     if (!display) miss(wanted.name, projector ? "projector" : "screen", display.message());
     auto opened = display ? std::move(*display) : nullptr;
-    if (projector)
-      out.projectors[static_cast<std::size_t>(projector - rig.projectors.data())] = std::move(opened);
-    else
+    if (projector) {
+      const auto index = static_cast<std::size_t>(projector - rig.projectors.data());
+      out.projectors[index] = std::move(opened);
+      out.latency_s[index] = wanted.latency_s;
+    } else {
       out.screens.push_back(std::move(opened));
+    }
     if (wanted.wall) out.walls[wanted.name] = *wanted.wall;
   }
   for (const device::KeysConfig& wanted : devices.keys) {

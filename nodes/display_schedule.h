@@ -27,6 +27,8 @@ class DisplaySchedule {
   double latency_s() const;
   /// The time between two refreshes; nullopt: the display has none, or it is not known yet.
   std::optional<double> refresh_s() const { return refresh_s_; }
+  /// The light of the last image, on this machine's clock; at a refresh, if there are some.
+  Stamp last_shown_at() const { return shown_.empty() ? Stamp() : shown_.back().shown_at; }
 
  private:
   struct Shown {

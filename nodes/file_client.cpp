@@ -33,7 +33,8 @@ using Problem = beast::error_code;
 constexpr std::chrono::milliseconds k_connect_limit{1000};   // for one address
 constexpr std::chrono::milliseconds k_progress_limit{5000};  // without a byte
 constexpr std::chrono::milliseconds k_piece_limit{60000};    // for one piece, which may come byte by byte
-constexpr std::chrono::milliseconds k_busy_limit{5000}, k_busy_pause{100};  // while the host answers 503
+constexpr std::chrono::milliseconds k_busy_limit{5000}, k_busy_pause{100};    // while the host answers 503
+constexpr double k_fetched_bytes_per_s = 9e6, k_fetched_burst_bytes = 0.5e6;  // 30 MB in 3.3 s
 constexpr std::size_t k_max_servers = 32;  // a machine has few addresses; each may cost k_connect_limit
 
 struct FreeInterfaceNames {
@@ -164,7 +165,8 @@ struct FileClient::Connection {
   }
 };
 
-FileClient::FileClient(const Offer& host) : host_(host) {}
+FileClient::FileClient(const Offer& host)
+    : host_(host), received_(k_fetched_bytes_per_s, k_fetched_burst_bytes) {}
 
 FileClient::~FileClient() = default;
 
@@ -226,6 +228,8 @@ Status FileClient::fetch_file(const SharedFile& file,
   if (!is_token(host_.token))
     return error("the host's files: expected a token in its offer, found another text.");
   for (std::uint64_t piece = 0; piece < piece_count(file.bytes); ++piece) {
+    const double delay_s = received_.delay_s(static_cast<double>(piece_size(file.bytes, piece)), now());
+    std::this_thread::sleep_for(std::chrono::duration<double>(delay_s));
     LIMN_TRY(const std::string bytes, fetch_piece(fmt::format("/files/{}/{}", file.sha256, piece)));
     if (bytes.size() != piece_size(file.bytes, piece))
       return error("the session's file {}: expected {} bytes, found {}. Wait for the host's next list.",

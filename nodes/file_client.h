@@ -7,12 +7,14 @@
 
 #include "core/result.h"
 #include "nodes/messages.h"
+#include "nodes/token_bucket.h"
 
 namespace limn::nodes {
 
 /// Fetches files from a host's FileServer over one connection, which is opened at the first of
-/// Offer::servers that answers and has the host's certificate. No call waits for ever: see the constants in
-/// file_client.cpp.
+/// Offer::servers that answers and has the host's certificate. It takes at most 9 MB a second, so that the
+/// frames of a session that runs find room on a network of 100 Mbit/s. No call waits for ever: see the
+/// constants in file_client.cpp.
 class FileClient {
  public:
   explicit FileClient(const Offer& host);
@@ -31,6 +33,7 @@ class FileClient {
   Result<std::string> fetch_piece(const std::string& target);
 
   Offer host_;
+  TokenBucket received_;
   std::unique_ptr<Connection> connection_;
 };
 

@@ -13,8 +13,9 @@ namespace limn::nodes {
 constexpr std::size_t k_max_files = 4096;
 constexpr std::uint64_t k_max_bytes = 4ull << 30;
 
-/// Files are sent in pieces of this size, bytes; the last one of a file is shorter.
-constexpr std::size_t k_piece_bytes = 4 << 20;
+/// Files are sent in pieces of this size, bytes; the last one of a file is shorter. A piece delays a frame's
+/// description by at most 10 ms on a network of 100 Mbit/s.
+constexpr std::size_t k_piece_bytes = 128 << 10;
 /// The pieces of a file, and the size of one of them.
 std::uint64_t piece_count(std::uint64_t file_bytes);
 std::size_t piece_size(std::uint64_t file_bytes, std::uint64_t piece);

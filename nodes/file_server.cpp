@@ -4,17 +4,20 @@
 
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cstring>
 #include <map>
 #include <mutex>
 #include <optional>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "core/worker_thread.h"
 #include "nodes/file_listing.h"
 #include "nodes/open_file.h"
 #include "nodes/sha256.h"
+#include "nodes/token_bucket.h"
 #include "remote/http/network.h"
 #include "remote/http/own_addresses.h"
 
@@ -30,6 +33,8 @@ using remote::ResponseCallback;
 constexpr int k_http_gone = 410;
 constexpr int k_token_bits = 128;
 constexpr std::string_view k_path = "/files/";
+constexpr double k_served_bytes_per_s = 50e6;  // to all nodes: less than half of a gigabit network
+constexpr double k_served_burst_bytes = 1e6;
 
 // A file on this machine and what it had in it when it was listed.
 struct ListedFile {
@@ -110,7 +115,11 @@ class FileRequests final : public remote::HttpHandler {
     if (!piece)
       return respond(
           error_response(remote::k_http_not_found, "expected a listed file and one of its pieces."));
-    if (!worker_.add_job([piece = *piece, respond] { respond(answer_with(piece)); }))
+    if (!worker_.add_job([this, piece = *piece, respond] {
+          const double delay_s = sent_.delay_s(static_cast<double>(piece.bytes), now());
+          std::this_thread::sleep_for(std::chrono::duration<double>(delay_s));
+          respond(answer_with(piece));
+        }))
       respond(error_response(remote::k_http_unavailable, "too many requests wait. Ask again in a moment."));
   }
   std::variant<std::shared_ptr<remote::WebSocketPeer>, HttpResponse> accept_web_socket(
@@ -146,6 +155,7 @@ class FileRequests final : public remote::HttpHandler {
   }
 
   const std::string token_ = random_secret(k_token_bits);
+  TokenBucket sent_{k_served_bytes_per_s, k_served_burst_bytes};  // used by the worker only
   WorkerThread worker_;
   std::mutex mutex_;
   std::map<std::string, ListedFile> files_;  // by SHA-256; the newest place of each content

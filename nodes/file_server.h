@@ -18,6 +18,8 @@ namespace limn::nodes {
 /// in memory and a slow connection has no time limit but progress. 401: not the token. 404: no such file or
 /// piece. 410: the file has changed since it was listed. 503: too many requests wait; ask again.
 ///
+/// All nodes together get at most 50 MB a second, so that frames find room on the network.
+///
 /// No copies are kept: the hash of each piece is known from the listing, and a piece is sent only if the
 /// bytes that were just read still have it. So what is sent is what was listed, whatever happens to the file.
 class FileServer final : public FileOffer {

@@ -276,6 +276,10 @@ Health WireReading::message(const limn_v1_Health& in) {
   out.clock_offset_s = in.clock_offset_s;
   out.clock_stddev_s = in.clock_stddev_s;
   out.problems = list(in.problems, &WireReading::text);
+  out.has_no_host = in.has_no_host;
+  out.refreshes = list(in.refreshes, [](const limn_v1_Refresh& item) {
+    return Refresh{stamp(item.at), item.period_s};
+  });
   return out;
 }
 

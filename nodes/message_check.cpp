@@ -97,6 +97,7 @@ void check(const scene::PosedScene& posed, MessageCheck* to) {
 void check(const Track& track, MessageCheck* to) {
   to->text("track.body", track.body);
   to->pose("track", track.world_from_body);
+  // Its lower triangle travels (to_wire.cpp), so what arrives is symmetric.
   to->finite_matrix("track.covariance", track.covariance);
   to->finite("track.rms_px", {track.rms_px});
 }
@@ -232,6 +233,8 @@ void check(const Health& health, MessageCheck* to) {
                         health.clock_stddev_s});
   to->count("problems", health.problems);
   for (const std::string& problem : health.problems) to->text("problems", problem, k_longest_text);
+  to->count("refreshes", health.refreshes);
+  for (const Refresh& refresh : health.refreshes) to->finite("refreshes", {refresh.period_s});
 }
 
 void check(const Departure& /*departure*/, MessageCheck* to) {

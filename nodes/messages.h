@@ -110,6 +110,14 @@ struct Answer {
   Stamp at = {};           ///< when it was shown or exposed, on the host's clock
 };
 
+/// When a display refreshes: at a known moment, and each period before and after.
+struct Refresh {
+  Stamp at;  ///< light of an image that it showed, on the host's clock
+  double period_s = 0;
+
+  bool operator==(const Refresh&) const = default;
+};
+
 /// How a node does, a few times a second. Best effort.
 struct Health {
   std::uint64_t shown = 0;   ///< number of the last frame shown
@@ -120,6 +128,8 @@ struct Health {
   double clock_offset_s = 0;  ///< host clock minus the node's
   double clock_stddev_s = 0;
   std::vector<std::string> problems;  ///< sentences for people; empty: all is well
+  bool has_no_host = false;           ///< it has been in the room for long enough to know
+  std::vector<Refresh> refreshes;     ///< those of its projectors that are known
 };
 
 /// The sender has gone: it said so, or was not heard for as long as its liveliness lasts. Made by the link.

@@ -1,7 +1,9 @@
 #include "nodes/node.h"
 
 #include <algorithm>
-#include <iterator>
+#include <chrono>
+#include <deque>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,7 +27,11 @@ constexpr double k_fade_s = 0.4;  // after the host has gone, which is noticed h
 constexpr double k_health_every_s = 0.2;
 constexpr double k_monitors_every_s = 1;
 constexpr double k_try_again_s = 2;    // after a setup could not be loaded
+constexpr double k_settled_s = 1.5;    // in the room; a host that is there has been found by then
+constexpr double k_drawing_s = 0.5;    // after a frame; later nothing is drawn, as in a calibration
 constexpr double k_clock_limit_s = 3;  // for the first comparison of the clocks
+
+bool has_same_content(const Setup& a, const Setup& b) { return a.files == b.files && a.devices == b.devices; }
 
 // What the node does between messages, on the thread of the OpenGL context.
 class NodeLoop {
@@ -63,6 +69,12 @@ class NodeLoop {
   }
 
  private:
+  struct WaitingOrder {
+    Order order;
+    std::string host;
+    std::future<cv::Mat> image;  // that it brings, decoded
+  };
+
   void offer_monitors() {
     if (offered_at_ && seconds_between(*offered_at_, now()) < k_monitors_every_s) return;
     std::vector<OfferedDevice> monitors = displays_.monitors();
@@ -102,18 +114,24 @@ class NodeLoop {
       load_at_ = now();
     }
     if (!host_ || !setup_ || !load_at_ || now() < *load_at_) return;
-    loader_.load(*setup_, *host_);
     load_at_.reset();
+    // A host that was restarted with the same session finds it drawn already.
+    if (frames_ && loader_.is_idle() && drawn_ && has_same_content(*drawn_, *setup_))
+      return frames_->adopt(host_->sender.run, setup_->revision);
+    loading_ = setup_;
+    loader_.load(*setup_, *host_);
   }
 
   void begin(Result<LoadedSetup> loaded) {
     if (loaded && host_ && loaded->run != host_->sender.run) return;  // its host has gone
+    drawn_.reset();
     const std::string problem_before = std::exchange(problem_, {});
     frames_.reset();
     auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)
                          : Result<std::unique_ptr<NodeFrames>>(loaded.error());
     if (frames) {
       frames_ = std::move(*frames);
+      drawn_ = loading_;
       gone_at_.reset();
       return;
     }
@@ -125,25 +143,39 @@ class NodeLoop {
 
   // Orders that come before the clocks are compared wait for that.
   void carry_out_orders() {
-    std::ranges::move(room_->take_orders(), std::back_inserter(orders_));
+    for (Room::ReceivedOrder& received : room_->take_orders()) {
+      std::future<cv::Mat> image = std::async(is_drawing() ? std::launch::async : std::launch::deferred,
+                                              [order = received.order] { return image_of(order); });
+      orders_.push_back({std::move(received.order), std::move(received.host), std::move(image)});
+    }
     if (orders_.empty()) waits_since_.reset();
     if (!orders_.empty() && !waits_since_) waits_since_ = now();
     if (!room_->host_clock() && waits_since_ && seconds_between(*waits_since_, now()) < k_clock_limit_s)
       return;
-    for (const auto& [order, host] : std::exchange(orders_, {})) carry_out(order, host);
+    while (!orders_.empty()) {
+      if (orders_.front().image.wait_for(std::chrono::seconds(0)) == std::future_status::timeout) return;
+      carry_out(&orders_.front());
+      orders_.pop_front();
+    }
   }
 
-  void carry_out(const Order& order, const std::string& host) {
-    if (is_for_camera(order)) return cameras_.carry_out(order, host);
-    Answer answer = carried_out(order, room_->host_clock(), &displays_);
-    answer.to = host;
+  // Whether frames are shown now, which must not wait for the decoding of an image.
+  bool is_drawing() const { return frames_ && shown_at_ && seconds_between(*shown_at_, now()) < k_drawing_s; }
+
+  void carry_out(WaitingOrder* waiting) {
+    const Order& order = waiting->order;
+    if (is_for_camera(order)) return cameras_.carry_out(order, waiting->host);
+    Answer answer = carried_out(order, waiting->image.get(), room_->host_clock(), &displays_);
+    answer.to = waiting->host;
     if (const Status sent = room_->send(answer); !sent) log_warning("node: {}", sent.message());
   }
 
   void show(const Moment& moment) {
     if (!frames_) return;
     gone_at_.reset();
-    frames_->show(moment, room_->host_clock(), &log_);
+    shown_at_ = now();
+    frames_->show(
+        moment, room_->host_clock(), [this](Stamp until) { return room_->wait_without_black(until); }, &log_);
   }
 
   void fade() {
@@ -160,12 +192,14 @@ class NodeLoop {
     if (reported_s >= 0 && reported_s < k_health_every_s) return;
     reported_at_ = now();
     Health health;
-    if (const auto clock = room_->host_clock()) {
+    const std::optional<ClockEstimate> clock = room_->host_clock();
+    if (clock) {
       health.clock_offset_s = 1e-9 * static_cast<double>(clock->offset.count());
       health.clock_stddev_s = clock->stddev_s;
     }
-    if (frames_) frames_->report(&health);
+    if (frames_) frames_->report(clock, &health);
     if (!problem_.empty()) health.problems.push_back(problem_);
+    health.has_no_host = !host_ && seconds_between(entered_at_, now()) > k_settled_s;
     if (const Status sent = room_->send(health); !sent) log_warning("node: {}", sent.message());
   }
 
@@ -174,16 +208,20 @@ class NodeLoop {
   CameraWorker cameras_;
   SetupLoader loader_;
   AppendLog log_;
+  const Stamp entered_at_ = now();
   Offer offer_;
   std::optional<Stamp> offered_at_;
   std::optional<Machine> host_;
-  std::vector<Room::ReceivedOrder> orders_;  // that wait
+  std::deque<WaitingOrder> orders_;
   std::optional<Stamp> waits_since_;
   std::optional<Setup> setup_;    // the host's last
+  std::optional<Setup> loading_;  // the last one that was given to the loader
+  std::optional<Setup> drawn_;    // that of the frames
   std::optional<Stamp> load_at_;  // when it is to be loaded
   std::unique_ptr<NodeFrames> frames_;
-  std::string problem_;           // why there are no frames
-  std::optional<Stamp> gone_at_;  // when the host was found to have gone, while the light fades
+  std::string problem_;            // why there are no frames
+  std::optional<Stamp> shown_at_;  // the last frame
+  std::optional<Stamp> gone_at_;   // when the host was found to have gone, while the light fades
   Stamp reported_at_;
 };
 

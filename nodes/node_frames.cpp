@@ -2,11 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <thread>
+#include <utility>
 
 #include "core/median.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
+#include "projector/gl.h"
 #include "session/recording.h"
 
 namespace limn::nodes {
@@ -42,28 +43,41 @@ Result<std::unique_ptr<NodeFrames>> NodeFrames::create(LoadedSetup setup,
   return out;
 }
 
-void NodeFrames::show(const Moment& moment, const std::optional<ClockEstimate>& clock, AppendLog* log) {
+void NodeFrames::adopt(std::uint64_t run, std::uint64_t revision) {
+  setup_.run = run;
+  setup_.revision = revision;
+}
+
+void NodeFrames::show(const Moment& moment,
+                      const std::optional<ClockEstimate>& clock,
+                      const Wait& wait,
+                      AppendLog* log) {
   if (moment.setup != setup_.revision) return;
+  const bool is_black = moment.frame.is_black;
   const Stamp begun = now();
   for (Output& output : outputs_) output.image = drawer_->image(moment.frame, output.projector);
+  if (!std::exchange(is_checked_, true))
+    if (const Status checked = projector::check_gl_memory("the projectors' images"); !checked)
+      problem_ = checked.message();
   draw_ms_.push_back(milliseconds_since(begun));
   if (draw_ms_.size() > k_draw_times) draw_ms_.pop_front();
 
   // A moment that is farther away comes from a clock that is not known yet, or has stepped.
-  const Stamp wanted =
-      clock ? std::min(clock->to_local(moment.frame.shown_at), shifted(now(), k_farthest_s)) : now();
+  const Stamp wanted = clock && !is_black
+                           ? std::min(clock->to_local(moment.frame.shown_at), shifted(now(), k_farthest_s))
+                           : now();
   std::vector<Output*> in_order;
   for (Output& output : outputs_) in_order.push_back(&output);
   std::ranges::sort(in_order, {}, [&](const Output* output) { return output->schedule.call_at(wanted); });
   late_ms_ *= k_late_decay;
   for (Output* output : in_order) {
-    if (output->schedule.is_too_late(wanted, now())) ++missed_;
-    std::this_thread::sleep_until(output->schedule.call_at(wanted));
+    if (!is_black && output->schedule.is_too_late(wanted, now())) ++missed_;
+    if (const Stamp call_at = output->schedule.call_at(wanted); call_at > now() && !wait(call_at)) return;
     Stamp shown_at;
     show_image(output->image, output, &shown_at);
     if (!output->problem.empty()) continue;
     const double late_s = seconds_between(wanted, shown_at);
-    late_ms_ = std::max(late_ms_, 1e3 * std::abs(late_s));
+    if (!is_black) late_ms_ = std::max(late_ms_, 1e3 * std::abs(late_s));
     const std::array<cv::Mat, 2> eyes = {output->image.left, output->image.right};
     const auto ns = [](Stamp at) { return at.time_since_epoch().count(); };
     log->add(fmt::format("{},{},{},{},{:016x}\n", moment.frame.number, output->config.name,
@@ -95,13 +109,16 @@ void NodeFrames::dim(double share) {
   }
 }
 
-void NodeFrames::report(Health* health) const {
+void NodeFrames::report(const std::optional<ClockEstimate>& clock, Health* health) const {
   health->shown = shown_;
   health->missed = missed_;
   health->draw_ms = median(std::vector<double>(draw_ms_.begin(), draw_ms_.end()));
   health->late_ms = late_ms_;
+  if (!problem_.empty()) health->problems.push_back(problem_);
   for (const Output& output : outputs_) {
     health->latency_s = std::max(health->latency_s, output.schedule.latency_s());
+    if (const auto period_s = output.schedule.refresh_s(); period_s && clock)
+      health->refreshes.push_back({clock->to_other(output.schedule.last_shown_at()), *period_s});
     if (!output.problem.empty()) health->problems.push_back(output.problem);
   }
 }

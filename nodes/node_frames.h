@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -25,9 +26,17 @@ class NodeFrames {
                                                     const std::string& node,
                                                     NodeDisplays* displays);
 
-  /// Draws a frame and shows it so that its light appears at FrameDescription::shown_at of the host's clock.
-  /// `log`: one line for each image that was shown. A moment of another setup is ignored.
-  void show(const Moment& moment, const std::optional<ClockEstimate>& clock, AppendLog* log);
+  /// Waits until a moment; false: something came that cannot wait.
+  using Wait = std::function<bool(Stamp until)>;
+  /// Draws a frame and shows it so that its light appears at FrameDescription::shown_at of the host's clock;
+  /// a black one at once. If `wait` returns false, the rest of the frame is left out. `log`: one line for
+  /// each image that was shown. A moment of another setup is ignored.
+  void show(const Moment& moment,
+            const std::optional<ClockEstimate>& clock,
+            const Wait& wait,
+            AppendLog* log);
+  /// From now on the setup counts as that of another run or revision, whose files and devices are the same.
+  void adopt(std::uint64_t run, std::uint64_t revision);
   /// Shows the last images with this share of their light.
   void dim(double share);
 
@@ -35,8 +44,8 @@ class NodeFrames {
     return setup_.run == run && setup_.revision == revision;
   }
   bool has_projectors() const { return !outputs_.empty(); }
-  /// Copies what it knows of frames and displays.
-  void report(Health* health) const;
+  /// Copies what it knows of frames and displays. `clock`: the host's.
+  void report(const std::optional<ClockEstimate>& clock, Health* health) const;
 
  private:
   struct Output {
@@ -56,6 +65,8 @@ class NodeFrames {
   std::uint64_t shown_ = 0, missed_ = 0;
   std::deque<double> draw_ms_;  // the last ones
   double late_ms_ = 0;
+  bool is_checked_ = false;  // whether the first frame's images found room
+  std::string problem_;      // if not
 };
 
 /// The first line of the log that NodeFrames::show writes.

@@ -36,12 +36,15 @@ Status open_display(const Order& order, NodeDisplays* devices, Answer* answer) {
   return {};
 }
 
-Status show(const Order& order, const ClockEstimate& clock, NodeDisplays* devices, Answer* answer) {
+Status show(const Order& order,
+            const cv::Mat& image,
+            const ClockEstimate& clock,
+            NodeDisplays* devices,
+            Answer* answer) {
   LIMN_TRY(device::Display * display, display_of(order, devices));
-  const auto image = image_formats::decode_png(order.image, false);
-  if (!image)
+  if (image.empty())
     return error("expected a PNG image to show, found {} bytes of something else.", order.image.size());
-  LIMN_TRY(const Stamp shown_at, display->show(image->samples));
+  LIMN_TRY(const Stamp shown_at, display->show(image));
   answer->at = clock.to_other(shown_at);
   return {};
 }
@@ -91,11 +94,19 @@ bool is_for_camera(const Order& order) {
   return order.what == open_camera || order.what == grab;
 }
 
-Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeDisplays* displays) {
+cv::Mat image_of(const Order& order) {
+  const auto image = image_formats::decode_png(order.image, false);
+  return image ? image->samples : cv::Mat();
+}
+
+Answer carried_out(const Order& order,
+                   const cv::Mat& image,
+                   const std::optional<ClockEstimate>& clock,
+                   NodeDisplays* displays) {
   return answer_to(order, [&](Answer* answer) -> Status {
     if (order.what == Order::What::open_display) return open_display(order, displays, answer);
     if (order.what == Order::What::show)
-      return clock ? show(order, *clock, displays, answer) : Status(no_clock());
+      return clock ? show(order, image, *clock, displays, answer) : Status(no_clock());
     return unknown(order);
   });
 }

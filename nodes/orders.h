@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <deque>
 #include <mutex>
+#include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
 #include <thread>
@@ -17,9 +18,15 @@ namespace limn::nodes {
 /// Whether an order is for a camera. Such orders may wait for an image.
 bool is_for_camera(const Order& order);
 
+/// The image that an order brings; empty: it brings none, or it cannot be decoded.
+cv::Mat image_of(const Order& order);
+
 /// Carries out an order on a node's displays or cameras. Stamps of order and answer are on the host's clock,
-/// which `clock` translates; nullopt: orders that need it are refused.
-Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeDisplays* displays);
+/// which `clock` translates; nullopt: orders that need it are refused. `image`: image_of() the order.
+Answer carried_out(const Order& order,
+                   const cv::Mat& image,
+                   const std::optional<ClockEstimate>& clock,
+                   NodeDisplays* displays);
 Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeCameras* cameras);
 
 /// Carries out the orders for cameras on a thread of its own, one after the other.

@@ -143,6 +143,11 @@ void Room::wait(std::chrono::nanoseconds limit) {
   has_arrived_ = false;
 }
 
+bool Room::wait_without_black(Stamp until) {
+  std::unique_lock lock(mutex_);
+  return !changed_.wait_until(lock, until, [&] { return moment_ && moment_->frame.is_black; });
+}
+
 std::optional<Moment> Room::take_moment() {
   const std::lock_guard lock(mutex_);
   return std::exchange(moment_, std::nullopt);

@@ -54,6 +54,8 @@ class Room {
   /// For nodes: waits until a moment, a setup or an order is there, or the host comes or goes.
   void wait(std::chrono::nanoseconds limit);
   std::optional<Moment> take_moment();
+  /// Waits until then. False: a black frame came before, which take_moment() gives.
+  bool wait_without_black(Stamp until);
   std::optional<Setup> take_setup();
   /// An order, and the host that sent it.
   struct ReceivedOrder {

@@ -7,6 +7,7 @@
 
 #include "core/log.h"
 #include "core/names.h"
+#include "nodes/refresh.h"
 
 namespace limn::nodes {
 namespace {
@@ -67,10 +68,22 @@ void RoomHost::note_description(const session::FrameDescription& frame) {
   Moment moment{revisions_, frame};
   moment.frame.number = ++frames_;  // a composer counts anew after a change of the scene
   if (const Status sent = room_->send(moment); !sent) log_warning("room: {}", sent.message());
+  last_ = std::move(moment.frame);
+}
+
+// Light that must go off does not wait until the next frame is described. That one, which is black too, has
+// the same number.
+void RoomHost::send_black() {
+  Moment moment{revisions_, last_};
+  moment.frame.number = frames_ + 1;
+  moment.frame.is_black = last_.is_black = true;
+  moment.frame.shown_at = now();
+  if (const Status sent = room_->send(moment); !sent) log_warning("room: {}", sent.message());
 }
 
 // Tells people which machines come, go and fail.
 void RoomHost::apply_edits(const session::SessionMoment& moment) {
+  if (moment.session.show_state().blackout && frames_ > 0 && !last_.is_black) send_black();
   std::set<std::string> problems;
   for (const std::string& name : nodes_) {
     const std::optional<Machine> node = room_->find(name);
@@ -104,6 +117,14 @@ void RoomHost::publish_state(const session::SessionMoment& moment) {
                         });
 }
 
+Stamp RoomHost::light_at(Stamp expected) const {
+  std::vector<Refresh> refreshes;
+  for (const Machine& machine : room_->machines())
+    if (machine.health && nodes_.contains(machine.sender.node))
+      refreshes.insert(refreshes.end(), machine.health->refreshes.begin(), machine.health->refreshes.end());
+  return refresh_near(expected, refreshes);
+}
+
 void RoomHost::log_images(const session::Session& session, Stamp at) {
   const std::vector<Imager>& projectors = session.setup().rig.projectors;
   for (const std::string& name : projectors_) {
@@ -115,7 +136,11 @@ void RoomHost::log_images(const session::Session& session, Stamp at) {
 }
 
 Status check_no_other_host(const Room& room, double wait_s) {
+  constexpr double k_least_s = 0.3;
   const Stamp begun = now();
+  const auto has_no_host = [](const Machine& machine) {
+    return machine.health && machine.health->has_no_host;
+  };
   while (seconds_between(begun, now()) < wait_s) {
     if (const auto host = room.host())
       return error(
@@ -123,6 +148,7 @@ Status check_no_other_host(const Room& room, double wait_s) {
           "there, or "
           "start limn node here.",
           host->sender.node);
+    if (seconds_between(begun, now()) > k_least_s && std::ranges::any_of(room.machines(), has_no_host)) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   return {};

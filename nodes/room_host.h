@@ -39,6 +39,8 @@ class RoomHost final : public session::SessionClient {
   void apply_edits(const session::SessionMoment& moment) override;
   void note_description(const session::FrameDescription& frame) override;
   void publish_state(const session::SessionMoment& moment) override;
+  /// A refresh of the displays at nodes.
+  Stamp light_at(Stamp expected) const override;
 
  private:
   RoomHost(Room* room, FileOffer* files, std::string devices, std::filesystem::path work, AppendLog log)
@@ -48,6 +50,7 @@ class RoomHost final : public session::SessionClient {
         work_(std::move(work)),
         log_(std::move(log)) {}
   void log_images(const session::Session& session, Stamp at);
+  void send_black();
   // Copies, lists and hashes the files of a setup, on any thread.
   static Result<std::vector<SharedFile>> shared_files(FileOffer* files,
                                                       const session::SessionSetup& setup,
@@ -63,6 +66,7 @@ class RoomHost final : public session::SessionClient {
   std::vector<std::string> projectors_;  // that nodes have
   Setup setup_;
   std::uint64_t frames_ = 0;
+  session::FrameDescription last_;  // the last one that was sent
   std::uint64_t revisions_ = 1;
   std::future<Result<std::vector<SharedFile>>> sharing_;  // for the newest revision
   int scenes_ = 1;                                        // Session::scenes() of the setup that was sent
@@ -71,7 +75,8 @@ class RoomHost final : public session::SessionClient {
   std::set<std::string> problems_;                        // that were reported and hold still
 };
 
-/// Waits for a moment for a host that is in the room already. Error: there is one; it is named.
+/// Waits for a host that is in the room already: `wait_s`, or shorter if a node is there that has none.
+/// Error: there is one; it is named.
 Status check_no_other_host(const Room& room, double wait_s);
 
 }  // namespace limn::nodes

@@ -74,6 +74,7 @@ class EngineLink final : public RoomLink, private EngineEvents {
   void attend(const std::stop_token& stop);
   void tell_engine(const std::vector<Sender>& departed, const std::vector<Sender>& arrived);
   void repeat(const std::optional<Message>& message);
+  void note_sleep(double seconds);
   bool is_forgotten(double awake_s);
   void enter_again();
 
@@ -258,7 +259,9 @@ void EngineLink::attend(const std::stop_token& stop) {
     if (now() >= next) {
       next = now() + k_offer_interval;
       repeat(offer);
-      if (is_forgotten(std::exchange(awake_s, seconds_with_sleep()))) enter_again();
+      const double before_s = std::exchange(awake_s, seconds_with_sleep());
+      note_sleep(awake_s - before_s);
+      if (is_forgotten(before_s)) enter_again();
     }
     lock.lock();
   }
@@ -274,6 +277,16 @@ void EngineLink::tell_engine(const std::vector<Sender>& departed, const std::vec
 void EngineLink::repeat(const std::optional<Message>& message) {
   if (!message) return;
   if (const Status sent = write(to_wire(*message, options_.self)); !sent) notice_warning(sent.message());
+}
+
+void EngineLink::note_sleep(double seconds) {
+  constexpr double k_slept_s = 5;  // a busy machine runs a thread sooner
+  if (seconds > k_slept_s)
+    notice_warning(
+        fmt::format("this program did not run for {:.0f} s: the machine slept, or somebody stopped it. "
+                    "Switch off its sleep while it belongs to a room (systemd-inhibit --what=sleep:idle "
+                    "limn ...).",
+                    seconds));
 }
 
 // Whether others have forgotten this program while it did not run, as a laptop that sleeps, or while nobody

@@ -33,6 +33,8 @@ class SetupLoader {
 
   /// Begins to load a setup of a host. One that is being loaded is finished before.
   void load(const Setup& setup, const Machine& host);
+  /// Whether nothing is being loaded, and take_loaded() has given what was.
+  bool is_idle() const { return !loading_.valid(); }
   /// The newest setup that was loaded since the last call, or the error why it could not be.
   std::optional<Result<LoadedSetup>> take_loaded();
 

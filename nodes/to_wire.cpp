@@ -310,6 +310,10 @@ void WireFilling::message(const Health& in, limn_v1_Health* out) {
   out->clock_offset_s = in.clock_offset_s;
   out->clock_stddev_s = in.clock_stddev_s;
   list(in.problems, &out->problems, &WireFilling::text);
+  out->has_no_host = in.has_no_host;
+  list(in.refreshes, &out->refreshes, [](const Refresh& item, limn_v1_Refresh* to) {
+    *to = {nanoseconds_of(item.at), item.period_s};
+  });
 }
 
 template <class T>

@@ -1,12 +1,70 @@
 #include "projector/gl.h"
 
 #include <algorithm>
+#include <array>
 #include <opencv2/imgproc.hpp>
 
 #include "core/log.h"
 #include "core/result.h"
 
 namespace limn::projector {
+namespace {
+
+constexpr int k_most_errors = 64;  // that OpenGL records at once; a lost context gives them without end
+
+const char* gl_error_name(GLenum code) {
+  switch (code) {
+    case GL_INVALID_ENUM:
+      return "GL_INVALID_ENUM";
+    case GL_INVALID_VALUE:
+      return "GL_INVALID_VALUE";
+    case GL_INVALID_OPERATION:
+      return "GL_INVALID_OPERATION";
+    case GL_INVALID_FRAMEBUFFER_OPERATION:
+      return "GL_INVALID_FRAMEBUFFER_OPERATION";
+    case GL_OUT_OF_MEMORY:
+      return "GL_OUT_OF_MEMORY";
+    case GL_CONTEXT_LOST:
+      return "GL_CONTEXT_LOST";
+    default:
+      return "an unknown error";
+  }
+}
+
+// The card's free memory, as far as the driver tells it.
+std::string free_memory() {
+  std::array<GLint, 4> kilobytes = {};
+  if (epoxy_has_gl_extension("GL_NVX_gpu_memory_info"))
+    glGetIntegerv(GL_GPU_MEMORY_INFO_CURRENT_AVAILABLE_VIDMEM_NVX, kilobytes.data());
+  else if (epoxy_has_gl_extension("GL_ATI_meminfo"))
+    glGetIntegerv(GL_TEXTURE_FREE_MEMORY_ATI, kilobytes.data());
+  else
+    return "";
+  return fmt::format(", {} MB free", kilobytes[0] / 1024);
+}
+
+}  // namespace
+
+void forget_gl_errors() {
+  for (int i = 0; i < k_most_errors && glGetError() != GL_NO_ERROR; ++i) {
+  }
+}
+
+Status check_gl_memory(const std::string& what) {
+  bool is_full = false;
+  for (int i = 0; i < k_most_errors; ++i) {
+    const GLenum code = glGetError();
+    if (code == GL_NO_ERROR) break;
+    is_full |= code == GL_OUT_OF_MEMORY;
+    if (code != GL_OUT_OF_MEMORY) log_warning("OpenGL: {} while {} was made.", gl_error_name(code), what);
+  }
+  if (!is_full) return {};
+  return error(
+      "{}: expected room in the graphics card's memory, found none ({}{}). Make the scene's textures and "
+      "meshes "
+      "smaller, leave out variants, end other programs that draw, or use a card with more memory.",
+      what, gl_error_name(GL_OUT_OF_MEMORY), free_memory());
+}
 
 GlName make_texture(GLenum target, GLenum format, int width, int height, int layers, int levels) {
   GLuint name = 0;

@@ -3,7 +3,10 @@
 #include <epoxy/gl.h>
 
 #include <opencv2/core/mat.hpp>
+#include <string>
 #include <utility>
+
+#include "core/result.h"
 
 namespace limn::projector {
 
@@ -50,6 +53,12 @@ void read_back(const GlName& framebuffer, const cv::Rect& place, cv::Mat* image)
 /// Reads the whole colour attachment of a framebuffer, the first row first, as an image of `type` (CV_8UC3 is
 /// BGR).
 cv::Mat read_back(const GlName& framebuffer, int width, int height, int type, GLenum format);
+
+/// Forgets the errors that OpenGL has recorded.
+void forget_gl_errors();
+/// Error: OpenGL has recorded since then that the graphics card's memory is full; `what` was to be made.
+/// Other errors are logged by their names.
+Status check_gl_memory(const std::string& what);
 
 /// Largest side of a scene's texture, in texels: the context's limit, and at most 4096.
 int largest_texture();

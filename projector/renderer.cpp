@@ -47,6 +47,7 @@ Renderer::~Renderer() = default;
 
 Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY_STATUS(check_context());
+  forget_gl_errors();
   auto times = std::make_unique<PassTimes>();
   LIMN_TRY(SceneCache cache, SceneCache::create(scene, rig, times.get()));
   LIMN_TRY(LightBalance balance, LightBalance::create(scene));
@@ -55,6 +56,7 @@ Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   const Defines shading_defines = base->scene.scene().shading_defines();
   LIMN_TRY(ProjectorView projectors, ProjectorView::create(base->shared(), shading_defines));
   LIMN_TRY(ImagerView imagers, ImagerView::create(base->shared(), scene, shading_defines));
+  LIMN_TRY_STATUS(check_gl_memory("the scene"));
   return Renderer(std::make_unique<Impl>(Impl{std::move(base), std::move(projectors), std::move(imagers)}));
 }
 

@@ -65,8 +65,9 @@ Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) 
                    projector_names_[i]);
     LIMN_TRY(const Stamp shown_at,
              display->show(i == projector ? image : cv::Mat(display->size(), CV_8UC1, cv::Scalar(0))));
-    // As it was measured. A display with a latency in the devices file is waited for longer than necessary.
-    on_surface_at_ = std::max(on_surface_at_, shifted(shown_at, latency_s_[i]));
+    // The measured latency counts from the call; the stamp contains the one that the devices file states.
+    const double in_stamp_s = i < devices_->latency_s.size() ? devices_->latency_s[i] : 0;
+    on_surface_at_ = std::max(on_surface_at_, shifted(shown_at, std::max(0.0, latency_s_[i] - in_stamp_s)));
   }
   return {};
 }

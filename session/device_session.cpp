@@ -103,8 +103,7 @@ class DeviceSink final : public FrameSink {
       device::Display* screen = devices_->screens[i].get();
       if (!screen) continue;
       const ScreenRequest request = request_of(*screen);
-      const auto found = std::find_if(images.begin(), images.end(),
-                                      [&](const ScreenImages& drawn) { return drawn.request == request; });
+      const auto found = std::ranges::find(images, request, &ScreenImages::request);
       if (found == images.end()) continue;
       const EyeImages& drawn = found->images;
       if (!drawn.left.empty())
@@ -173,7 +172,7 @@ void note_missing(const SessionDevices& devices, DeviceHealth* health, Telemetry
 
 Status check_devices(const SessionDevices& devices) {
   const auto any = [](const auto& all) {
-    return std::any_of(all.begin(), all.end(), [](const auto& device) { return device != nullptr; });
+    return std::ranges::any_of(all, [](const auto& device) { return device != nullptr; });
   };
   if (!any(devices.cameras)) return error("live: expected a camera that works, found none. Run limn doctor.");
   if (!any(devices.projectors))

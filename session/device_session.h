@@ -22,6 +22,7 @@ namespace limn::session {
 struct SessionDevices {
   std::vector<std::unique_ptr<device::CameraSource>> cameras;  ///< named as in the rig
   std::vector<std::unique_ptr<device::Display>> projectors;    ///< in the rig's order
+  std::vector<double> latency_s = {};                          ///< that their stamps contain; empty: none
   std::vector<std::unique_ptr<device::Display>> screens;       ///< each shows what scene::screen_content says
   std::map<std::string, Wall> walls = {};                      ///< screens with a place in the world, by name
   std::vector<device::KeySource> keys = {};

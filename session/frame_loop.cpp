@@ -40,8 +40,9 @@ Result<bool> FrameLoop::step() {
   // Edit: changes by a script, a recording, files and people.
   LIMN_TRY_STATUS(setting_.source.edit(&session));
   apply_client_edits();
-  LIMN_TRY(const std::optional<FrameTimes> times, setting_.clock.next_frame());
+  LIMN_TRY(std::optional<FrameTimes> times, setting_.clock.next_frame());
   if (!times) return true;
+  for (const SessionClient* client : parts_.clients) times->shown_at = client->light_at(times->shown_at);
 
   if (auto dark = setting_.sink.dark_projectors()) session.set_dark_projectors(std::move(*dark));
 
@@ -81,8 +82,7 @@ Result<bool> FrameLoop::step() {
 
   // Update the clients.
   const ScreenRequest for_clients{.what = session.show_state().screen};
-  const auto screen = std::find_if(screens.begin(), screens.end(),
-                                   [&](const ScreenImages& s) { return s.request == for_clients; });
+  const auto screen = std::ranges::find(screens, for_clients, &ScreenImages::request);
   return publish_to_clients(is_anything_seen ? &shown : nullptr,
                             screen == screens.end() ? cv::Mat() : screen->images.left);
 }
@@ -113,8 +113,7 @@ std::vector<projector::Overlay> FrameLoop::client_overlays() {
 // Draws each kind of screen image once, and only those that somebody looks at.
 std::vector<ScreenImages> FrameLoop::screen_images() {
   std::vector<ScreenRequest> wanted = setting_.sink.wanted_screens();
-  const bool is_wanted = std::any_of(parts_.clients.begin(), parts_.clients.end(),
-                                     [](const SessionClient* client) { return client->wants_screen(); });
+  const bool is_wanted = std::ranges::any_of(parts_.clients, &SessionClient::wants_screen);
   const Stamp at = now();
   if (is_wanted &&
       (!client_screen_at_ || seconds_between(*client_screen_at_, at) >= setting_.sink.screen_interval_s())) {
@@ -123,8 +122,7 @@ std::vector<ScreenImages> FrameLoop::screen_images() {
   }
   std::vector<ScreenImages> out;
   for (const ScreenRequest& request : wanted) {
-    const auto is_same = [&](const ScreenImages& drawn) { return drawn.request == request; };
-    if (std::none_of(out.begin(), out.end(), is_same))
+    if (std::ranges::find(out, request, &ScreenImages::request) == out.end())
       out.push_back({request, parts_.session.screen(request)});
   }
   return out;

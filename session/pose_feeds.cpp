@@ -62,7 +62,7 @@ device::NetPlace read_place(const ConfigNode& node) {
 
 FeedConfig read_feed(const ConfigNode& node, const std::map<std::string, tracker::FeedBody>& known) {
   node.only({"name", "protocol", "receive", "from", "bodies", "world_from_feed", "delay_ms", "left_handed",
-             "unit", "quaternion"});
+             "unit", "quaternion", "frame"});
   FeedConfig feed;
   feed.setup.name = node.at("name").text();
   feed.decoder = exchange::read_decoder_options(node);
@@ -178,6 +178,8 @@ void PoseFeeds::receive(Stamp at, bool is_real_time, Stamp until, Feed* feed, Fe
         is_real_time ? std::clamp(shifted(at, -arrival->age_s), feed->read_at.value_or(Stamp{}), at) : at;
     for (ForeignPose& pose : *arrival->poses) out->poses[0].push_back({std::move(pose), arrived_at});
   }
+  if (const std::string problem = feed->decoder.take_problem(); !problem.empty())
+    refuse(problem, at, feed, out);
   if (count < k_most_at_once) return;
   int thrown_away = 0;
   while (thrown_away < k_most_thrown_away && now() < until && next_arrival(feed)) ++thrown_away;

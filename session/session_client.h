@@ -34,6 +34,8 @@ class SessionClient {
 
   /// Called with what a frame shows, before it is drawn here: other machines can draw it at the same time.
   virtual void note_description(const FrameDescription&) {}
+  /// When the light of a frame can appear that is expected at a moment: displays refresh at fixed ones.
+  virtual Stamp light_at(Stamp expected) const { return expected; }
   /// Overlays for the projected light only: recorded and reported images are without them.
   virtual std::vector<projector::Overlay> overlays(Session*) { return {}; }
   /// Whether the next publish_state() needs an image of the screen.

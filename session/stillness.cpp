@@ -18,10 +18,6 @@ bool stays(const Eigen::AlignedBox3d& box, const Pose& before, const Pose& now) 
   return most_m < k_stays_m;
 }
 
-bool is_exactly(const Pose& a, const Pose& b) {
-  return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
-}
-
 }  // namespace
 
 bool is_elsewhere(const Pose& before, const Pose& now) {
@@ -43,7 +39,7 @@ void keep_parts_still(const scene::PosedScene& shown,
                       scene::PosedScene* posed) {
   const auto& before = shown.world_from_prototype;
   const auto& now = posed->world_from_prototype;
-  if (before.has_value() != now.has_value() || (now && !is_exactly(*before, *now))) return;
+  if (before.has_value() != now.has_value() || (now && !is_same(*before, *now))) return;
   for (scene::PosedPart& part : posed->parts) {
     const auto was = std::find_if(shown.parts.begin(), shown.parts.end(), [&](const scene::PosedPart& other) {
       return other.slot == part.slot && other.variant == part.variant;

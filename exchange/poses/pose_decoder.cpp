@@ -8,6 +8,13 @@
 #include "exchange/poses/posi_stage_net.h"
 
 namespace limn::exchange {
+namespace {
+
+// Messages in which a chain of transforms may have a gap before it is reported: at the start the static ones
+// may come later than the others.
+constexpr int k_patient_messages = 20;
+
+}  // namespace
 
 PoseDecoderOptions read_decoder_options(const ConfigNode& tracker) {
   PoseDecoderOptions out;
@@ -16,6 +23,11 @@ PoseDecoderOptions read_decoder_options(const ConfigNode& tracker) {
     const ConfigNode receive = tracker.at("receive");
     out.topic = receive.text();
     if (const Status checked = check_ros_topic(out.topic); !checked) receive.problem(checked.message());
+  }
+  if (const auto frame = tracker.find("frame")) {
+    out.frame = frame->text();
+    if (!has_transforms(out.topic) || out.frame.empty())
+      frame->problem("expected the name of a frame, and that the topic carries transforms (/tf).");
   }
   if (const auto left = tracker.find("left_handed")) out.is_left_handed = left->boolean();
   for (const char* key : {"unit", "quaternion"})
@@ -28,8 +40,9 @@ PoseDecoderOptions read_decoder_options(const ConfigNode& tracker) {
 }
 
 Status check_sensor(const PoseDecoderOptions& options, const std::string& sensor) {
-  if (options.protocol != PoseProtocol::ros || has_transforms(options.topic) || sensor == options.topic)
-    return {};
+  if (options.protocol != PoseProtocol::ros) return {};
+  if (sensor == options.frame) return error("expected another frame than '{}' itself.", sensor);
+  if (has_transforms(options.topic) || sensor == options.topic) return {};
   return error("expected the topic '{}' as the only sensor, because it carries one pose, found '{}'.",
                options.topic, sensor);
 }
@@ -37,10 +50,11 @@ Status check_sensor(const PoseDecoderOptions& options, const std::string& sensor
 Result<std::vector<ForeignPose>> PoseDecoder::decoded(std::span<const RosPose> message) {
   if (message.size() > k_most_poses)
     return error("ROS 2: expected at most {} poses in a message, found more.", k_most_poses);
+  if (!options_.frame.empty()) return followed(message);
   std::vector<ForeignPose> poses;
   std::optional<std::string> frame = frame_;
   for (const RosPose& each : message) {
-    if (!options_.sensors.contains(each.sensor)) continue;
+    if (each.is_static || !options_.sensors.contains(each.sensor)) continue;
     LIMN_TRY(ForeignPose pose, pose_of_ros(each));
     if (!frame) frame = each.frame;
     if (*frame != each.frame)
@@ -52,6 +66,26 @@ Result<std::vector<ForeignPose>> PoseDecoder::decoded(std::span<const RosPose> m
     poses.push_back(std::move(pose));
   }
   frame_ = frame;
+  return poses;
+}
+
+std::vector<ForeignPose> PoseDecoder::followed(std::span<const RosPose> message) {
+  std::vector<ForeignPose> poses;
+  for (const RosPose& transform : message)
+    if (const Status added = frames_.add(transform); !added) problem_ = added.message();
+  for (const std::string& sensor : options_.sensors) {
+    Followed& before = followed_[sensor];
+    const auto found = frames_.locate(options_.frame, sensor);
+    before.failures = found ? 0 : before.failures + 1;
+    if (before.failures > k_patient_messages) problem_ = found.message();
+    if (!found || found->change == before.change || (found->time_s && found->time_s == before.time_s))
+      continue;
+    before = {found->time_s, found->change, 0};
+    ForeignPose pose{sensor, found->frame_from_sensor};
+    pose.time_s = found->time_s;
+    if (options_.is_left_handed) pose.feed_from_sensor = mirrored(pose.feed_from_sensor);
+    poses.push_back(std::move(pose));
+  }
   return poses;
 }
 

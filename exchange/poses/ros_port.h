@@ -23,8 +23,8 @@ class RosPort {
  public:
   virtual ~RosPort() = default;
 
-  /// Receives a topic (PoseStamped, or TFMessage where has_transforms()) from now on. The result names it in
-  /// next(). Error: the middleware's.
+  /// Receives a topic (PoseStamped, or TFMessage where has_transforms()) from now on, and with one of
+  /// transforms its static_topic(). The result names it in next(). Error: the middleware's.
   virtual Result<std::size_t> subscribe(const std::string& topic) = 0;
   /// The next message of a topic. Of those that wait, the oldest are lost beyond 128. nullopt: none waits.
   virtual std::optional<RosMessage> next(std::size_t subscription) = 0;

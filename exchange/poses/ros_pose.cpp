@@ -85,6 +85,9 @@ Status check_ros_topic(std::string_view topic) {
     const bool is_first = topic[i - 1] == '/';
     is_topic &= is_letter(c) || c == '_' || (is_first ? false : is_digit(c) || c == '/');
   }
+  if (topic.ends_with("/tf_static"))
+    return error("expected a topic such as /tf, with which that of the static transforms comes, found '{}'.",
+                 printable_name(std::string(topic)));
   if (is_topic) return {};
   return error("expected the absolute name of a topic of ROS 2 such as /mocap/wand or /tf, found '{}'.",
                printable_name(std::string(topic)));

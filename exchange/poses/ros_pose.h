@@ -21,6 +21,7 @@ struct RosPose {
   std::uint32_t ns = 0;
   std::array<double, 3> position_m = {};
   std::array<double, 4> rotation_xyzw = {0, 0, 0, 1};
+  bool is_static = false;  ///< a transform of `/tf_static`, which holds until another one comes
 };
 
 /// The checked pose. Error: no frame, one that is longer than 255 bytes, unprintable or the sensor itself; a
@@ -37,10 +38,13 @@ RosPose ros_pose(const ForeignPose& pose,
 /// Where two become equal, the later one gets a number.
 std::vector<std::string> ros_names(std::span<const std::string> names);
 
-/// Error: not an absolute name of a topic such as /mocap/wand.
+/// Error: not an absolute name of a topic such as /mocap/wand, or one of static transforms, which come with
+/// those of the topic beside it.
 Status check_ros_topic(std::string_view topic);
 
 /// Whether a topic carries transforms (its last part is "tf") and not one pose.
 constexpr bool has_transforms(std::string_view topic) { return topic.substr(topic.rfind('/') + 1) == "tf"; }
+/// The topic of the static transforms beside a topic of transforms: /tf_static beside /tf.
+inline std::string static_topic(const std::string& topic) { return topic + "_static"; }
 
 }  // namespace limn::exchange

@@ -48,6 +48,13 @@ Qos ros_reader_qos(bool has_transforms) {
   dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
   return qos;
 }
+// As tf2's listener has it: who comes late gets what was published before.
+Qos static_reader_qos() {
+  Qos qos = common_qos(true);
+  dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, 0);
+  dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  return qos;
+}
 
 std::string text_of(const char* text) { return text ? text : ""; }
 
@@ -106,15 +113,23 @@ class DdsRosPort final : public exchange::RosPort {
   Status publish_transforms(const std::string& topic, std::span<const RosPose> poses) override;
 
  private:
+  struct Subscription;
+  // A topic of a subscription: the one that it names, or that of the static transforms beside it.
+  struct Inlet {
+    Subscription* subscription = nullptr;
+    bool is_static = false;
+  };
   struct Subscription {
     std::string topic;
     bool has_transforms = false;
+    Inlet moving{this, false}, fixed{this, true};
     std::mutex mutex;
     std::deque<RosMessage> waiting;
   };
 
   Result<dds_entity_t> writer_of(const std::string& topic, bool has_transforms);
-  static void notice_data(dds_entity_t reader, void* subscription);
+  Status receive(Inlet* inlet);
+  static void notice_data(dds_entity_t reader, void* inlet);
   static void keep(RosMessage message, Subscription* subscription);
 
   RosDomain domain_;
@@ -130,25 +145,34 @@ Status DdsRosPort::open(const RosNetwork& network) {
 }
 
 Result<std::size_t> DdsRosPort::subscribe(const std::string& topic) {
-  const bool has_transforms = exchange::has_transforms(topic);
-  auto subscription = std::make_unique<Subscription>();
-  subscription->topic = topic;
-  subscription->has_transforms = has_transforms;
-  LIMN_TRY(const dds_entity_t made, domain_.topic(topic, type_of(has_transforms)));
-  const std::unique_ptr<dds_listener_t, decltype(&dds_delete_listener)> listener(
-      dds_create_listener(subscription.get()), &dds_delete_listener);
-  dds_lset_data_available(listener.get(), &DdsRosPort::notice_data);
-  const Qos qos = ros_reader_qos(has_transforms);
   const std::lock_guard lock(mutex_);
-  subscriptions_.push_back(std::move(subscription));
-  const dds_entity_t reader = dds_create_reader(domain_.participant(), made, qos.get(), listener.get());
-  if (reader < 0) return ros_failed("topic " + topic, reader);
-  entities_.push_back(reader);
+  subscriptions_.push_back(std::make_unique<Subscription>());
+  Subscription& subscription = *subscriptions_.back();
+  subscription.topic = topic;
+  subscription.has_transforms = exchange::has_transforms(topic);
+  LIMN_TRY_STATUS(receive(&subscription.moving));
+  if (subscription.has_transforms) LIMN_TRY_STATUS(receive(&subscription.fixed));
   return subscriptions_.size() - 1;
 }
 
+Status DdsRosPort::receive(Inlet* inlet) {
+  const bool has_transforms = inlet->subscription->has_transforms;
+  const std::string& named = inlet->subscription->topic;
+  const std::string topic = inlet->is_static ? exchange::static_topic(named) : named;
+  LIMN_TRY(const dds_entity_t made, domain_.topic(topic, type_of(has_transforms)));
+  const std::unique_ptr<dds_listener_t, decltype(&dds_delete_listener)> listener(dds_create_listener(inlet),
+                                                                                 &dds_delete_listener);
+  dds_lset_data_available(listener.get(), &DdsRosPort::notice_data);
+  const Qos qos = inlet->is_static ? static_reader_qos() : ros_reader_qos(has_transforms);
+  const dds_entity_t reader = dds_create_reader(domain_.participant(), made, qos.get(), listener.get());
+  if (reader < 0) return ros_failed("topic " + topic, reader);
+  entities_.push_back(reader);
+  return {};
+}
+
 void DdsRosPort::notice_data(dds_entity_t reader, void* argument) {
-  auto* subscription = static_cast<Subscription*>(argument);
+  const auto* inlet = static_cast<const Inlet*>(argument);
+  Subscription* subscription = inlet->subscription;
   const Stamp arrived_at = now();
   take_all(reader, [&](const void* sample, const dds_sample_info_t& info) {
     if (!info.valid_data) return;
@@ -156,8 +180,10 @@ void DdsRosPort::notice_data(dds_entity_t reader, void* argument) {
     if (subscription->has_transforms) {
       const auto& list = static_cast<const TransformMessage*>(sample)->transforms;
       // One more than is accepted, so that longer messages are refused.
-      for (std::uint32_t k = 0; k < list._length && k <= exchange::k_most_poses; ++k)
+      for (std::uint32_t k = 0; k < list._length && k <= exchange::k_most_poses; ++k) {
         message.poses.push_back(read_transform(list._buffer[k]));
+        message.poses.back().is_static = inlet->is_static;
+      }
     } else {
       message.poses.push_back(read_pose(*static_cast<const PoseStamped*>(sample), subscription->topic));
     }

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "nodes/refresh.h"
 #include "tests/support/matchers.h"
 
 namespace limn::nodes {
@@ -82,6 +83,34 @@ TEST(DisplaySchedule, SaysWhatIsTooLate) {
   EXPECT_FALSE(schedule.is_too_late(wanted, shifted(wanted, -0.02)));
   EXPECT_FALSE(schedule.is_too_late(wanted, shifted(wanted, -0.013)));
   EXPECT_TRUE(schedule.is_too_late(wanted, shifted(wanted, -0.01)));
+}
+
+// ---- the refresh that a frame is planned for ----
+
+double near_s(double expected_s, std::vector<Refresh> displays) {
+  return seconds(refresh_near(shifted(Stamp{}, expected_s), displays));
+}
+Refresh refresh(double at_s, double period_s) { return {shifted(Stamp{}, at_s), period_s}; }
+
+TEST(RefreshNear, IsARefreshThatLeavesTimeToDraw) {
+  const std::vector<Refresh> display = {refresh(99.5, 0.02)};
+  EXPECT_NEAR(near_s(100.000, display), 100.00, 1e-6);
+  EXPECT_NEAR(near_s(100.004, display), 100.00, 1e-6);  // less than a quarter of a period early
+  EXPECT_NEAR(near_s(100.006, display), 100.02, 1e-6);
+  EXPECT_NEAR(near_s(100.015, display), 100.02, 1e-6);
+}
+
+TEST(RefreshNear, DisplaysOutOfStepAreMetInTheirMiddle) {
+  EXPECT_NEAR(near_s(100, {refresh(99.996, 0.02), refresh(100.002, 0.02)}), 99.999, 1e-6);
+  EXPECT_NEAR(near_s(100, {refresh(100.001, 0.02), refresh(99.996, 0.01)}), 100.001, 1e-6);
+}
+
+TEST(RefreshNear, WhatCannotBeIsIgnored) {
+  EXPECT_EQ(near_s(100, {}), 100);
+  for (const Refresh& wrong : {refresh(90, 0.02), refresh(99.99, 0), refresh(99.99, -1), refresh(99.99, 1e-9),
+                               Refresh{Stamp::max(), 0.02}, Refresh{Stamp::min(), 0.02}, refresh(99.99, NAN)})
+    EXPECT_EQ(near_s(100, {wrong}), 100);
+  EXPECT_EQ(near_s(100, {refresh(99.99, 0.02), refresh(100, 0.02)}), 100);  // opposite phases
 }
 
 }  // namespace

@@ -4,6 +4,11 @@ The host's clock is this test's, so stamps in shown.csv can be compared with tim
 """
 
 import json
+import os
+import re
+import shutil
+import signal
+import subprocess
 import time
 from pathlib import Path
 
@@ -166,7 +171,87 @@ def a_clock_steps(machines):
             **compared(machines, [machines.folder / f"{node}-0/shown.csv" for node in NODES])}
 
 
-SCENARIOS = [a_killed_node_is_back, the_host_is_killed, a_link_is_pulled, a_clock_steps]
+def a_node_sleeps(machines):
+    """A laptop that sleeps for 10 s: nothing runs, and on waking its clock is behind by as much."""
+    machines.set_clock("left")
+    host, programs = begin(machines)
+    slept_ns = time.monotonic_ns()
+    programs["left"].send_signal(signal.SIGSTOP)
+    log, left_log = machines.folder / "host.log", machines.folder / "left.log"
+    missed_s = wait_for(5, lambda: "left is not in the room" in log.read_text(), "the host misses the node")
+    time.sleep(10 - missed_s)
+    path = machines.folder / "left-0/shown.csv"
+    before = rows_in(path)
+    machines.set_clock("left", step_s=-10)
+    woken_ns = time.monotonic_ns()
+    programs["left"].send_signal(signal.SIGCONT)
+    # The first image after the sleep may be the one that it was about to show.
+    wait_for(15, lambda: rows_in(path) > before + 4, "the node shows images again")
+    time.sleep(1)
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    assert "this program did not run for 1" in left_log.read_text(), left_log.read_text()[-2000:]
+    back_s = (int(shown(path)[before + 3]["wanted_at_ns"]) - woken_ns) / 1e9
+    assert back_s < 6, back_s
+    return {"missed after, s": missed_s, "images after waking, s": back_s,
+            **while_broken(machines, slept_ns, woken_ns),
+            **compared(machines, [machines.folder / f"{node}-0/shown.csv" for node in NODES])}
+
+
+def a_full_disk_is_named(machines):
+    """A node whose cache has no room says so, also at the host, and shows images when there is some."""
+    cache = machines.folder / "small"
+    cache.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", cache], check=True)
+    try:
+        machines.start_node("right")
+        machines.start_node("left", cache=cache)
+        host = machines.start_host(0)
+        path, log, host_log = (machines.folder / name for name in ("left-0/shown.csv", "left.log", "host.log"))
+        message = "expected room for the session's files, found: No space left on device. Free some space there"
+        wait_for(60, lambda: message in log.read_text(), "the node names the full disk")
+        wait_for(10, lambda: message in host_log.read_text(), "the host names the full disk")
+        assert rows_in(path) == 0
+        freed_ns = time.monotonic_ns()
+        subprocess.run(["mount", "-o", "remount,size=64m", cache], check=True)
+        wait_for(20, lambda: rows_in(path) > 10, "the node shows images")
+        machines.end()
+        assert host.returncode == 0, "the host failed"
+        return {"images after there was room, s": first_shown_s(path, freed_ns), **compared(machines, [path])}
+    finally:
+        for program in machines.programs:
+            program.kill()
+            program.wait()
+        subprocess.run(["umount", cache], check=True)
+
+
+def a_large_scene_comes_while_frames_run(machines):
+    """A node without files joins a session whose scene has 30 MB, on cables of 100 Mbit/s."""
+    machines.network.limit(100)
+    scene = machines.folder / "large"
+    shutil.copytree((machines.folder / "recording/scene").resolve(), scene)
+    (scene / "texture.bin").write_bytes(os.urandom(30_000_000))
+    machines.start_node("right", cache=machines.folder / "cache-right")
+    host = machines.start_host(0, scene="large")
+    right = machines.folder / "right-0/shown.csv"
+    wait_for(60, lambda: rows_in(right) > SETTLED_ROWS, "right shows images")
+    time.sleep(5)
+    begin_ns = time.monotonic_ns()
+    machines.start_node("left", cache=machines.folder / "cache-left")
+    log = machines.folder / "left.log"
+    wait_for(30, lambda: "files from the host" in log.read_text(), "left has the files")
+    end_ns = time.monotonic_ns()
+    left = machines.folder / "left-0/shown.csv"
+    wait_for(20, lambda: rows_in(left) > 5, "left shows images")
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    megabytes, fetched_s = re.search(r"([\d.]+) MB in ([\d.]+) s", log.read_text()).groups()
+    assert float(megabytes) > 30 and float(fetched_s) < 5, (megabytes, fetched_s)
+    return {"30 MB came in, s": float(fetched_s), **while_broken(machines, begin_ns, end_ns),
+            **compared(machines, [right, left])}
+
+
+SCENARIOS = [a_killed_node_is_back, the_host_is_killed, a_link_is_pulled, a_clock_steps, a_full_disk_is_named]
 
 
 def table(name, runs):

@@ -49,6 +49,13 @@ class Network:
     def in_switch(self, *command):
         run("ip", "netns", "exec", self.switch, *command)
 
+    def limit(self, megabits):
+        """Every machine's cable carries so much, and queues at most 50 ms of it."""
+        shape = ["root", "tbf", "rate", f"{megabits}mbit", "burst", "32kb", "latency", "50ms"]
+        for number, name in enumerate(self.machines, 1):
+            self.in_switch("tc", "qdisc", "add", "dev", f"p{number}", *shape)
+            run("ip", "netns", "exec", self.names[name], "tc", "qdisc", "add", "dev", "eth0", *shape)
+
     def plug(self, name, is_plugged):
         self.in_switch("ip", "link", "set", f"p{self.machines.index(name) + 1}", "up" if is_plugged else "down")
 
@@ -166,14 +173,16 @@ class Machines:
         self.programs.append(program)
         return program
 
-    def start_node(self, name, run_number=0, clock_ahead_s=100, extra=()):
-        return self.start(name, [self.limn, "node", "--join", "studio", "--name", name, "--out",
+    def start_node(self, name, run_number=0, clock_ahead_s=100, extra=(), cache=None):
+        """With `cache`, a folder, the node does not share its files with the other nodes here."""
+        own = ["env", f"XDG_CACHE_HOME={cache}"] if cache else []
+        return self.start(name, [*own, self.limn, "node", "--join", "studio", "--name", name, "--out",
                                  self.folder / f"{name}-{run_number}", *extra], clock_ahead_s)
 
-    def start_host(self, seconds, out="host", extra=()):
+    def start_host(self, seconds, out="host", extra=(), scene="recording/scene"):
         return self.start("host", [self.limn, "live", "--room", "studio", "--name", "host", "--devices",
                                    self.folder / "devices.json", "--rig", self.folder / "recording/rig", "--scene",
-                                   self.folder / "recording/scene", "--seconds", seconds, "--out",
+                                   self.folder / scene, "--seconds", seconds, "--out",
                                    self.folder / out, *extra])
 
     def set_clock(self, name, drift=0.0, step_s=0.0):
@@ -206,13 +215,16 @@ def shown(path):
         return list(csv.DictReader(file))
 
 
-def prepare(limn, folder, world="studio", nodes=NODES, images=3000):
+def prepare(limn, folder, world="studio", nodes=NODES, swaying=None, images=3000):
     """A recorded session in a world of config/, whose camera images the host plays again and again, and devices whose
-    projectors are plugged into the nodes in turn."""
+    projectors are plugged into the nodes in turn. `swaying`: a marker that moves by 50 mm to both sides in a second."""
     environment = dict(os.environ, HOME=str(folder / "home"), XDG_CONFIG_HOME=str(folder / "config"))
     path = Path(__file__).resolve().parents[2] / f"config/worlds/{world}.json"
-    subprocess.run([limn, "live", "--world", path, "--resolution", "0.25", "--seconds", "1", "--record", folder / "recording"],
-                   check=True, env=environment, capture_output=True)
+    sway = {"at_s": 0, "until_s": 9, "sway": swaying, "amplitude_m": [0.05, 0, 0], "hz": 1}
+    script = {"schema": "limn.script/1", "seconds": 1, "events": [sway] if swaying else []}
+    (folder / "script.json").write_text(json.dumps(script))
+    subprocess.run([limn, "live", "--world", path, "--resolution", "0.25", "--script", folder / "script.json", "--record",
+                    folder / "recording"], check=True, env=environment, capture_output=True)
     recorded = sorted((folder / "recording/frames/camera0").iterdir())
     film = folder / "film"
     film.mkdir()

@@ -8,6 +8,8 @@ Exit code 77: namespaces are not permitted here.
 """
 
 import argparse
+import bisect
+import csv
 import os
 import subprocess
 import sys
@@ -17,6 +19,33 @@ from pathlib import Path
 import failures
 from machines import (NODES, PREFIX, LossyNetwork, Machines, Network, NetworkOfVersion6, NetworkWithoutMulticast,
                       fingerprints, prepare, rows_in, run, send_osc, shown, wait_for)
+
+
+def placement_mm(poses, path, slot="mirror"):
+    """How far the light of a part is from where the host says that it belongs at each moment, RMS: at a node, and at an
+    ideal one, which shows every frame at its moment. An image stays until the next one. All on the host's clock."""
+    with open(poses) as file:
+        belongs = [(float(row["shown_at_s"]), [float(row[axis]) for axis in ("x_mm", "y_mm", "z_mm")])
+                   for row in csv.DictReader(file) if row["slot"] == slot]
+    times = [at for at, _ in belongs]
+
+    def place(at_s):
+        after = min(max(bisect.bisect_left(times, at_s), 1), len(times) - 1)
+        (t0, p0), (t1, p1) = belongs[after - 1], belongs[after]
+        share = (at_s - t0) / (t1 - t0)
+        return [a + share * (b - a) for a, b in zip(p0, p1)]
+
+    def rms(lights, begin_s, end_s):
+        squares = []
+        for (from_s, drawn), (until_s, _) in zip(lights, lights[1:]):
+            for step in range(int((min(until_s, end_s) - max(from_s, begin_s)) / 0.002)):
+                there = place(max(from_s, begin_s) + 0.002 * step)
+                squares.append(sum((a - b) ** 2 for a, b in zip(there, drawn)))
+        return (sum(squares) / len(squares)) ** 0.5
+
+    at_node = [(int(row["shown_at_ns"]) / 1e9, place(int(row["wanted_at_ns"]) / 1e9)) for row in shown(path)[10:]]
+    limits = at_node[0][0], at_node[-1][0]
+    return rms(at_node, *limits), rms(belongs, *limits)
 
 
 def images_are_the_hosts(machines):
@@ -59,6 +88,32 @@ def nobody_freezes_on_a_bad_network(machines):
 
 
 nobody_freezes_on_a_bad_network.network = LossyNetwork
+
+
+def placement_on_a_network(machines):
+    """A part that sways by 50 mm in a second; on this network and on one that delays and loses packets."""
+    for node in NODES:
+        machines.start_node(node)
+    host = machines.start_host(0)
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    wait_for(90, lambda: all(rows_in(path) > 150 for path in paths), "the nodes show images")
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    numbers = {}
+    for node, path in zip(NODES, paths):
+        at_node_mm, ideal_mm = placement_mm(machines.folder / "host/poses.csv", path)
+        numbers[f"placement at {node}, RMS, mm"] = at_node_mm
+        numbers[f"of an ideal node, of {node}'s time, RMS, mm"] = ideal_mm
+        numbers[f"ratio of {node}"] = at_node_mm / ideal_mm
+    return numbers
+
+
+def placement_on_a_bad_network(machines):
+    return placement_on_a_network(machines)
+
+
+placement_on_a_bad_network.network = LossyNetwork
+placement_on_a_network.swaying = placement_on_a_bad_network.swaying = "aruco_4x4_50:0"
 
 
 def meet(machines, extra=()):
@@ -111,6 +166,33 @@ def a_blackout_reaches_all_and_one_recording_replays_the_room(machines):
     return {**black_s, **equal}
 
 
+def twenty_blackouts(machines):
+    """Blackout on and off, 20 times in one session: until both nodes are black."""
+    for node in NODES:
+        machines.start_node(node)
+    host = machines.start_host(0, extra=["--osc", "9000"])
+    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
+    wait_for(60, lambda: all(rows_in(path) > 60 for path in paths), "the nodes show images")
+    sent = []
+    for number in range(20):
+        sent.append(send_osc(machines, "host", "/limn/blackout", "on"))
+        time.sleep(0.5)
+        send_osc(machines, "host", "/limn/blackout", "off")
+        time.sleep(0.5 + 0.013 * number)  # at another moment of a frame each time
+    send_osc(machines, "host", "/limn/blackout", "on")
+    time.sleep(1)
+    machines.end()
+    assert host.returncode == 0, "the host failed"
+    black_s = []
+    for path in paths:
+        rows = shown(path)
+        black = rows[-1]["fingerprint"]
+        at = [int(row["shown_at_ns"]) for row in rows if row["fingerprint"] == black]
+        black_s.append([(min(at_ns for at_ns in at if at_ns > sent_ns) - sent_ns) / 1e9 for sent_ns in sent])
+    both_s = sorted(max(pair) for pair in zip(*black_s))
+    return {"both nodes black, median of 20, s": both_s[10], "worst, s": both_s[-1]}
+
+
 def a_thousand_frames_of_three_nodes(machines):
     """Three nodes with four projectors, whose clocks are 100 s apart and drift by 50 ppm against each other."""
     nodes = machines.nodes
@@ -159,7 +241,8 @@ SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_mee
              machines_meet_by_ipv6, *failures.SCENARIOS,
              a_blackout_reaches_all_and_one_recording_replays_the_room, a_second_host_is_refused]
 
-BY_NAME = [a_thousand_frames_of_three_nodes]  # long ones
+BY_NAME = [twenty_blackouts, a_thousand_frames_of_three_nodes, placement_on_a_network, placement_on_a_bad_network, failures.a_node_sleeps,
+           failures.a_large_scene_comes_while_frames_run]  # long ones
 
 
 def run_once(scenario, run_number, arguments):
@@ -168,10 +251,11 @@ def run_once(scenario, run_number, arguments):
     subprocess.run(["rm", "-rf", place], check=True)
     place.mkdir(parents=True)
     nodes, world = getattr(scenario, "nodes", NODES), getattr(scenario, "world", "studio")
-    prepared = arguments.folder.resolve() / f"prepared-{world}"
+    swaying = getattr(scenario, "swaying", None)
+    prepared = arguments.folder.resolve() / f"prepared-{world}{'-swaying' if swaying else ''}"
     if not prepared.exists():
         prepared.mkdir()
-        prepare(arguments.limn.resolve(), prepared, world, nodes)
+        prepare(arguments.limn.resolve(), prepared, world, nodes, swaying)
     for path in prepared.iterdir():
         (place / path.name).symlink_to(path)
     network = getattr(scenario, "network", Network)(["host", *nodes])

@@ -8,6 +8,7 @@
 #include <fstream>
 #include <map>
 #include <opencv2/core.hpp>
+#include <sstream>
 #include <thread>
 
 #include "core/image_io.h"
@@ -111,7 +112,8 @@ class NodeTest : public ::testing::Test {
     const session::FrameTimes times{rig_.now(), shifted(rig_.now(), 0.02)};
     const auto input = session::frame_input(setup_.scene, {}, percepts, show_state(), times);
     session::FrameDescription frame = composer_->describe(input);
-    frame.shown_at = shifted(now(), 0.02);  // nodes have this machine's clock, not the virtual rig's
+    frame.shown_at =
+        shifted(now(), light_after_s_);  // nodes have this machine's clock, not the virtual rig's
     client_->note_description(frame);
     const std::array<cv::Mat, 2> eyes = {composer_->draw().projectors[1], cv::Mat()};
     return session::fingerprint(eyes);
@@ -137,6 +139,7 @@ class NodeTest : public ::testing::Test {
   std::optional<session::Perception> perception_;
   std::optional<session::FrameComposer> composer_;
   scene::ShowState show_state_;
+  double light_after_s_ = 0.02;
 };
 
 // Fingerprints by frame, from shown.csv.
@@ -170,6 +173,12 @@ TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
                   Pose(rig_.world().world_from_prototype.rotation,
                        rig_.world().world_from_prototype.translation + Eigen::Vector3d(1e-3 * i, 0, 0)));
         send();
+        if (i == 5) {  // an order between two frames
+          const auto screen =
+              RoomOpener(host_.get(), nullptr).display(offscreen("screen0", "left", {64, 48}));
+          ASSERT_TRUE(screen) << screen.message();
+          EXPECT_TRUE((*screen)->show(cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 20, 30))));
+        }
         std::this_thread::sleep_for(100ms);
       }
     }
@@ -178,6 +187,80 @@ TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
     EXPECT_GT(shown.size(), 5u);
     for (const auto& [frame, hash] : shown) EXPECT_EQ(hash, wanted.at(frame)) << "frame " << frame;
   }
+}
+
+TEST_F(NodeTest, FramesArePlannedForTheRefreshOfANodesDisplay) {
+  open_host();
+  const Stamp refreshed_at = now(), expected = shifted(refreshed_at, 0.207);
+  EXPECT_EQ(client_->light_at(expected), expected);
+  test::MemoryLink left(&room_, "left"), stranger(&room_, "stranger");
+  for (test::MemoryLink* link : {&left, &stranger}) ASSERT_TRUE(link->send(Offer{}));
+  Health health;
+  health.refreshes = {{shifted(refreshed_at, 0.005), 0.02}};
+  ASSERT_TRUE(stranger.send(health));  // none of the session's displays are there
+  health.refreshes = {{refreshed_at, 0.02}};
+  ASSERT_TRUE(left.send(health));
+  ASSERT_TRUE(holds_within(5s, [&] {
+    const auto machine = host_->find("left");
+    return machine && machine->health;
+  }));
+  EXPECT_NEAR(seconds_between(refreshed_at, client_->light_at(expected)), 0.22, 1e-6);
+}
+
+TEST(OtherHost, IsWaitedForUntilANodeSaysThatItHasNone) {
+  test::MemoryRoom room;
+  Room host(std::make_unique<test::MemoryLink>(&room, "host"));
+  test::MemoryLink node(&room, "left");
+  ASSERT_TRUE(node.send(Offer{}));
+  const auto waited_s = [&] {
+    const Stamp begun = now();
+    EXPECT_TRUE(check_no_other_host(host, 1));
+    return seconds_between(begun, now());
+  };
+  ASSERT_TRUE(node.send(Health{}));
+  EXPECT_GE(waited_s(), 1);
+  Health health;
+  health.has_no_host = true;
+  ASSERT_TRUE(node.send(health));
+  EXPECT_LT(waited_s(), 0.6);
+  test::MemoryLink other(&room, "other");
+  ASSERT_TRUE(other.send(Offer{.is_host = true}));
+  ASSERT_TRUE(holds_within(5s, [&] { return host.host().has_value(); }));
+  const Status checked = check_no_other_host(host, 1);
+  ASSERT_FALSE(checked);
+  EXPECT_NE(checked.message().find("expected no host in it, found other"), std::string::npos);
+}
+
+// What the last line of shown.csv has in a column.
+std::string last_shown(const fs::path& folder, std::size_t column) {
+  std::ifstream file(folder / "shown.csv");
+  std::string line, last;
+  while (std::getline(file, line)) last = line;
+  std::istringstream fields(last);
+  for (std::size_t i = 0; i <= column; ++i) std::getline(fields, line, ',');
+  return line;
+}
+
+TEST_F(NodeTest, ABlackFrameWaitsForNothing) {
+  open_host();
+  std::string black;
+  std::int64_t sent_ns = 0;
+  {
+    RunningNode node(&room_, "left", folder_);
+    ASSERT_TRUE(holds_within(20s, [&] {
+      send_frame();
+      return shown_by("left") > 0;
+    }));
+    light_after_s_ = 0.24;
+    send_frame();
+    std::this_thread::sleep_for(60ms);
+    show_state_.blackout = true;
+    sent_ns = now().time_since_epoch().count();
+    black = fmt::format("{:016x}", send_frame());
+    std::this_thread::sleep_for(300ms);
+  }
+  EXPECT_EQ(last_shown(folder_, 4), black);
+  EXPECT_LT(1e-9 * static_cast<double>(std::stoll(last_shown(folder_, 3)) - sent_ns), 0.12);
 }
 
 TEST_F(NodeTest, ShowsAndGrabsForACalibration) {

@@ -140,9 +140,13 @@ void fields(F& f, Answer& x) {
   f.machine(x.to), f(x.number), f(x.error), f(x.size), f.bytes(x.image), f(x.at);
 }
 template <class F>
+void fields(F& f, Refresh& x) {
+  f(x.at), f(x.period_s);
+}
+template <class F>
 void fields(F& f, Health& x) {
   f(x.shown), f(x.missed), f(x.latency_s), f(x.draw_ms), f(x.late_ms), f(x.clock_offset_s),
-      f(x.clock_stddev_s), f(x.problems);
+      f(x.clock_stddev_s), f(x.problems), f(x.has_no_host), f(x.refreshes);
 }
 template <class F>
 void fields(F& /*f*/, Departure& /*x*/) {}

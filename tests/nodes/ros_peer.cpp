@@ -1,9 +1,12 @@
 // A program that takes part in ROS 2 as far as its middleware is concerned, for tests: ros_peer DOMAIN
-// publish|images|hd|listen. It uses Cyclone DDS alone, prints "ready", and leaves when its input ends.
+// publish|arm|images|hd|listen. It uses Cyclone DDS alone, prints "ready", and leaves when its input ends.
 //
 //   publish   each 20 ms: PoseStamped on /mocap/wand (best effort), /mocap/nan (every second one with a NaN)
 //   and
 //             /mocap/lost (its frame changes), and a TFMessage on /tf
+//   arm       once, at the start, on /tf_static (kept for who comes late): hand as seen from arm; each 20 ms
+//   on /tf
+//             arm as seen from map, which moves by 1 m/s along x
 //   images    each 20 ms, with the stamp of the present: an Image of 64 x 48 on /camera/image_raw (rgb8, rows
 //   of
 //             200 bytes, best effort) and on /camera/grey (mono8, reliable, stamp 0), a CompressedImage on
@@ -102,6 +105,29 @@ void publish(dds_entity_t participant) {
     dds_write(nan, &bad);
     dds_write(lost, &astray);
     dds_write(transforms, &message);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
+void write_transform(dds_entity_t writer, TransformStamped transform) {
+  const TransformMessage message{{1, 1, &transform, false}};
+  dds_write(writer, &message);
+}
+
+void publish_arm(dds_entity_t participant) {
+  const dds_entity_t topic =
+      made(dds_create_topic(participant, k_transforms, "rt/tf_static", nullptr, nullptr));
+  dds_qos_t* kept = quality(DDS_RELIABILITY_RELIABLE);
+  dds_qset_durability(kept, DDS_DURABILITY_TRANSIENT_LOCAL);  // tf2's StaticTransformBroadcaster
+  dds_qset_history(kept, DDS_HISTORY_KEEP_LAST, 1);
+  const dds_entity_t fixed = made(dds_create_writer(participant, topic, kept, nullptr));
+  const dds_entity_t moving = writer(participant, "rt/tf", k_transforms, DDS_RELIABILITY_RELIABLE);
+  TransformStamped hand = transform_of(0, "hand", 0.25);
+  static char arm[] = "arm";
+  hand.header.frame_id = arm;
+  write_transform(fixed, hand);
+  for (int i = 0; !input_has_ended(); ++i) {
+    write_transform(moving, transform_of(i, "arm", 0.02 * i));
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
 }
@@ -259,6 +285,8 @@ int main(int count, char** words) {
   const std::string what = words[2];
   if (what == "publish")
     publish(participant);
+  else if (what == "arm")
+    publish_arm(participant);
   else if (what == "images")
     publish_images(participant);
   else if (what == "hd")

@@ -112,6 +112,26 @@ TEST_F(Ros, PosesWithoutNumbersOrInAnotherFrameAreRefusedInWords) {
   EXPECT_TRUE(has_note("'/mocap/lost': frame_id: expected '"));
 }
 
+TEST_F(Ros, TransformsAreFollowedFromStaticOnesOn) {
+  const Peer peer(domain, "arm");
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // comes after the static transform was sent
+  const auto port = open_ros_port();
+  ASSERT_TRUE(port) << port.message();
+  FeedConfig config = feed_of("/tf", "hand");
+  config.decoder.frame = "map";
+  auto feeds = PoseFeeds::open({config}, port->get());
+  ASSERT_TRUE(feeds) << feeds.message();
+  const FeedInput input = received_from(**feeds, 1, 0);
+  ASSERT_GE(input.poses[0].size(), 5U);
+  const Eigen::Quaterniond turn(0.5, 0.5, -0.5, 0.5);
+  for (const auto& [pose, arrived_at] : input.poses[0]) {
+    EXPECT_EQ(pose.sensor, "hand");
+    const Pose map_from_arm(turn, {pose.time_s.value() - 100, 2, 3}), arm_from_hand(turn, {0.25, 2, 3});
+    EXPECT_TRUE(test::pose_near(pose.feed_from_sensor, map_from_arm * arm_from_hand, 1e-6_deg, 1e-6));
+  }
+  EXPECT_TRUE(input.notes.empty()) << input.notes[0];
+}
+
 // ---- out ----
 
 void append(std::string* hex, const void* bytes, std::size_t count) {
@@ -230,6 +250,12 @@ TEST_F(Ros, TheTrackersFileNamesTopics) {
   for (const char* wrong : {"tf", "/", "/a//b", "/a/", "/1a", "/a b", ""})
     EXPECT_NE(message_of(wrong, "wand", "").find("receive: expected the absolute name"), std::string::npos)
         << wrong;
+  EXPECT_EQ(message_of("/tf", "wand", "\"frame\": \"map\","), "topic /tf");
+  EXPECT_NE(message_of("/tf", "map", "\"frame\": \"map\",").find("expected another frame than 'map' itself"),
+            std::string::npos);
+  EXPECT_NE(message_of("/a", "/a", "\"frame\": \"map\",").find("that the topic carries transforms"),
+            std::string::npos);
+  EXPECT_NE(message_of("/tf_static", "wand", "").find("expected a topic such as /tf"), std::string::npos);
   EXPECT_NE(message_of("/tf", "wand", "\"from\": \"127.0.0.1\",").find("without the protocol ros"),
             std::string::npos);
 }

@@ -87,6 +87,22 @@ TEST(Wire, HostileMomentsAreRefused) {
   });
 }
 
+// Its lower triangle travels.
+TEST(Wire, ACovarianceArrivesSymmetric) {
+  Message message = Moment();
+  auto& moment = std::get<Moment>(message);
+  moment.frame.viewer = viewer_imager(Pose(), 64, 48, 40);
+  moment.frame.tracks.resize(1);
+  Matrix6d& sent = moment.frame.tracks[0].covariance;
+  sent = Matrix6d::Random();
+  const WireSample sample = to_wire(message, k_sender);
+  const auto received = from_wire(sample.topic, sample.sample.get(), {});
+  ASSERT_TRUE(received) << received.message();
+  const Matrix6d arrived = std::get<Moment>(received->message).frame.tracks.at(0).covariance;
+  EXPECT_EQ(arrived, arrived.transpose());
+  EXPECT_EQ(arrived, Matrix6d(sent.selfadjointView<Eigen::Lower>()));
+}
+
 TEST(Wire, HostileOrdersAreRefused) {
   Order order;
   order.to = "beta";

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "projector/gl.h"
 #include "projector/gpu_scene.h"
 #include "projector/renderer.h"
 #include "scene/tangents.h"
@@ -68,6 +69,19 @@ class BadInput : public test::GlTest {
   }
   void TearDown() override { EXPECT_EQ(glGetError(), static_cast<GLenum>(GL_NO_ERROR)); }
 };
+
+TEST_F(BadInput, AGraphicsCardThatIsFullIsNamed) {
+  forget_gl_errors();
+  EXPECT_TRUE(check_gl_memory("the scene"));
+  const GlName larger_than_any = make_buffer(nullptr, std::size_t{1} << 50);
+  const Status checked = check_gl_memory("the scene");
+  ASSERT_FALSE(checked);
+  const std::string expected =
+      "the scene: expected room in the graphics card's memory, found none (GL_OUT_OF_MEMORY";
+  EXPECT_EQ(checked.message().substr(0, expected.size()), expected);
+  glEnable(GL_TEXTURE_2D_ARRAY);  // another error is only logged
+  EXPECT_TRUE(check_gl_memory("the scene"));
+}
 
 TEST_F(BadInput, ATextureBeyondTheLimitIsNamedAndShownReduced) {
   scene::Scene scene = wall_and_part();
