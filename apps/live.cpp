@@ -373,7 +373,7 @@ Status play_with_devices(const LiveOptions& options) {
   if (!options.room.room.empty()) {
     LIMN_TRY(room, HostedRoom::open(options.room, devices, options.out, &setup));
   }
-  nodes::RoomOpener opener(room ? room->room() : nullptr, desktop ? &*desktop : nullptr);
+  nodes::RoomOpener opener(room ? room->room() : nullptr, desktop ? &*desktop : nullptr, setup.screens);
   session::SessionDevices open = opened(devices, setup.rig, &opener);
   return run_session(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
                      room ? room->client() : nullptr,
