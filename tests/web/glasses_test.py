@@ -1,9 +1,9 @@
 """Glasses on the page: Chromium with an emulated headset (npm package iwer), against a served session of the studio.
 
-    glasses_test.py --room web_glasses_room --out FOLDER [--only marker|camera]
+    glasses_test.py --room web_glasses_room --out FOLDER [--only marker|camera|camera-soon]
 
 A person wears them who has a marker on the glasses (`marker`), and another one whose glasses have none, but give the page
-photographs of their camera (`camera`). The script moves the clocks of the room and of the headset, a step for each frame, so that nothing depends on how fast
+photographs of their camera (`camera`; `camera-soon`: for some seconds only). The script moves the clocks of the room and of the headset, a step for each frame, so that nothing depends on how fast
 the machine draws. Seconds in results are seconds of the person's motion.
 iwer is installed into FOLDER with npm; without npm or its registry the checks that need it are skipped (code 77).
 Screenshots are written to FOLDER.
@@ -33,6 +33,7 @@ SIZE = (1280, 640)  # of both eyes
 IPD_M = 0.063
 # The glasses' camera is at the left eye and has its field of view (glasses_in_page.js). It takes a photograph in every
 # second frame; frames are twice as long, because nothing is measured between two photographs.
+SOON_S, MOST_OFF_SOON_MM, MOST_OFF_SOON_DEG = 3.0, 3.0, 0.3
 CAMERA_PX, CAMERA_FOCAL_PX, CAMERA_STEP_S = 960, 480 / math.tan(math.radians(55 / 2)), 1 / 15
 
 
@@ -441,6 +442,10 @@ class CameraChecks(Checks):
         return found["state"]
 
     def the_camera_finds_the_room(self, browser):
+        self.put_on(browser)
+        self.place_is_found(browser)
+
+    def put_on(self, browser):
         browser.script("limn_glasses.set_path(arguments[0])", self.room.path)
         browser.script("limn_glasses.grant('cpu-optimized', ['local-floor', 'hand-tracking', 'camera-access'])")
         browser.click("#glasses")
@@ -451,7 +456,29 @@ class CameraChecks(Checks):
         expect((place["marker"], place["markers"]) == ("camera", ["camera"]), "glasses by their camera", place)
         browser.screenshot(os.path.join(self.out, "waiting.png"))
         self.is_open = True
-        self.place_is_found(browser)
+
+    def parts_are_soon_where_they_are(self, browser):
+        self.put_on(browser)
+        self.measured["registered_s"] = round(self.look_round(browser), 2)
+        for _ in self.walk(browser, SOON_S):
+            pass
+        self.stand(browser, "all parts on the page", lambda: browser.text("#glasses-why") == READY)
+        self.draw_parts(browser, "full")
+        offs, offs_px = [], []
+        for eye in self.capture(browser):
+            true_eye = self.true_eye(eye)
+            offs.append(difference(pose_product(eye["world_from_feed"], eye["feed_from_view"]), true_eye))
+            there = Mask(self.true_masks(eye, true_eye)["full"], eye["width"])
+            self.save(f"soon-{eye['eye']}", eye, there)
+            expect(there.area() > 200, "something to see", there.area())
+            offs_px.append(round(offset_px(Mask(eye["bits"], eye["width"]), there), 2))
+        self.measured |= {"eye_off_mm_deg": [[round(value, 3) for value in off] for off in offs], "off_px": offs_px}
+        expect(all(mm <= MOST_OFF_SOON_MM and degrees <= MOST_OFF_SOON_DEG for mm, degrees in offs),
+               f"the eyes within {MOST_OFF_SOON_MM} mm and {MOST_OFF_SOON_DEG} degrees", offs)
+        expect(max(offs_px) <= MOST_OFF_PX, f"at most {MOST_OFF_PX} px", offs_px)
+
+    def soon(self):
+        return self.in_glasses(self.parts_are_soon_where_they_are) if self.iwer else SKIPPED
 
     def all(self):
         if not self.iwer:
@@ -464,19 +491,20 @@ def main():
     parser = argparse.ArgumentParser()
     for name in ("room", "out"):
         parser.add_argument(f"--{name}", required=True)
-    parser.add_argument("--only", choices=("marker", "camera"))
+    parser.add_argument("--only", choices=("marker", "camera", "camera-soon"))
     options = parser.parse_args()
     os.makedirs(options.out, exist_ok=True)
     iwer = installed_iwer(options.out)
     code = 0
     for kind, way in (("marker", []), ("camera", ["camera"])):
-        if options.only not in (None, kind):
+        is_soon = kind == "camera" and options.only == "camera-soon"
+        if options.only not in (None, kind) and not is_soon:
             continue
         out = os.path.join(options.out, *way)
         with contextlib.closing(Room(options.room, out, *way)) as room, contextlib.closing(Driver()) as driver:
             checks = (CameraChecks if way else Checks)(room, driver, iwer, out)
             try:
-                code = max(code, checks.all())
+                code = max(code, checks.soon() if is_soon else checks.all())
             except Failed as failure:
                 print(f"FAILED: {failure}\nmeasured: {checks.measured}\nsee {out}")
                 return 1
