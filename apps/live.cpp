@@ -58,10 +58,16 @@ void end_session_on_signals() {
   if (std::signal(SIGHUP, end_session) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);
 }
 
+// Whether the session is on devices; else it is on the virtual rig.
+bool has_devices(const LiveOptions& options) {
+  return !options.devices.empty() || !options.room.room.empty();
+}
+
 Status check_options(const LiveOptions& options) {
-  if (!options.stereo.empty() && !options.devices.empty())
+  if (!options.stereo.empty() && has_devices(options))
     return usage_error(
-        "--stereo: expected it without --devices. For devices, set stereo at the display in the devices "
+        "--stereo: expected it without --devices and --room. For devices, set stereo at the display in the "
+        "devices "
         "file.");
   if (!(options.seconds >= 0) || options.seconds > 1e6)
     return usage_error("--seconds: expected a number of seconds, or 0 for no end, found {}.",
@@ -75,15 +81,13 @@ Status check_options(const LiveOptions& options) {
         "--triple-pose triangle: expected --prediction hold or linear with it, found filtered, which uses "
         "the "
         "balls' centres themselves and no pose of one image.");
-  if (!options.devices.empty() && options.rig.empty())
-    return usage_error("--devices: expected --rig and --scene with it, found neither.");
-  if (!options.devices.empty() && (!options.world.empty() || !options.script.empty()))
+  const char* with_devices = !options.devices.empty() ? "--devices" : "--room";
+  if (has_devices(options) && options.rig.empty())
+    return usage_error("{}: expected --rig and --scene with it, found neither.", with_devices);
+  if (has_devices(options) && (!options.world.empty() || !options.script.empty()))
     return usage_error(
-        "--devices: expected no --world and no --script with it, because they are for the virtual rig.");
-  if (!options.room.room.empty() && options.devices.empty())
-    return usage_error(
-        "--room: expected --devices with it, a file that says which devices are plugged into which machine, "
-        "found none.");
+        "{}: expected no --world and no --script with it, because they are for the virtual rig.",
+        with_devices);
   if (!options.serve_show.empty() && options.serve.empty())
     return usage_error("--serve-show: expected --serve with it, found none.");
   if (options.rig.empty() != options.scene.empty())
@@ -351,9 +355,10 @@ session::SessionDevices opened(const device::Devices& devices, const Rig& rig, d
 }
 
 Status play_with_devices(const LiveOptions& options) {
-  LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
   session::SessionSetup setup;
   LIMN_TRY(setup.rig, load_rig(options.rig));
+  LIMN_TRY(const device::Devices named, options.devices.empty() ? devices_in_room(options.room, setup.rig)
+                                                                : device::load_devices(options.devices));
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));
@@ -377,7 +382,7 @@ Status play_with_devices(const LiveOptions& options) {
   if (!options.room.room.empty()) {
     LIMN_TRY(room, HostedRoom::open(options.room, devices, options.out, &setup));
   }
-  nodes::RoomOpener opener(room ? room->room() : nullptr, desktop ? &*desktop : nullptr);
+  nodes::RoomOpener opener(room ? room->room() : nullptr, desktop ? &*desktop : nullptr, setup.screens);
   session::SessionDevices open = opened(devices, setup.rig, &opener);
   return run_session(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
                      room ? room->client() : nullptr,
@@ -392,7 +397,7 @@ Status play_with_devices(const LiveOptions& options) {
 Status run_live(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_options(options));
   end_session_on_signals();
-  return options.devices.empty() ? play_in_virtual_room(options) : play_with_devices(options);
+  return has_devices(options) ? play_with_devices(options) : play_in_virtual_room(options);
 }
 
 }  // namespace limn::apps

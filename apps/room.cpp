@@ -10,6 +10,7 @@
 #include "core/log.h"
 #include "core/version.h"
 #include "nodes/node.h"
+#include "nodes/room_devices.h"
 #include "nodes/room_keys.h"
 #include "nodes/room_link.h"
 #include "nodes/shared_files.h"
@@ -20,6 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double k_other_host_s = 1.5;  // in which a host that is in the room is heard
+constexpr double k_offers_s = 4;        // until all nodes have offered their devices
 
 std::atomic<bool> g_node_is_ended = false;
 void end_node(int) { g_node_is_ended = true; }
@@ -58,6 +60,16 @@ Result<std::unique_ptr<nodes::Room>> enter_room_for_orders(const RoomOptions& op
   LIMN_TRY(std::unique_ptr<nodes::Room> room, enter_room(options, true));
   LIMN_TRY_STATUS(room->offer(host_offer(nullptr)));
   return room;
+}
+
+Result<device::Devices> devices_in_room(const RoomOptions& options, const Rig& rig) {
+  LIMN_TRY(const std::unique_ptr<nodes::Room> room, enter_room_for_orders(options));
+  LIMN_TRY(device::Devices devices, nodes::wait_for_devices(*room, rig, k_offers_s));
+  for (const device::DisplayConfig& display : devices.displays)
+    log_info("live: {} is {} at {}", display.name, display.monitor, display.host);
+  for (const device::CameraConfig& camera : devices.cameras)
+    log_info("live: {} is {} at {}", camera.name, camera.source, camera.host);
+  return devices;
 }
 
 Result<std::unique_ptr<HostedRoom>> HostedRoom::open(const RoomOptions& options,

@@ -30,6 +30,10 @@ Result<std::unique_ptr<nodes::Room>> enter_room(const RoomOptions& options, bool
 /// Enters a room as a host without a session, which uses the nodes' displays and cameras by orders.
 Result<std::unique_ptr<nodes::Room>> enter_room_for_orders(const RoomOptions& options);
 
+/// The rig's devices in a room without a devices file: those that its nodes offer (nodes/room_devices.h).
+/// Enters the room for some seconds.
+Result<device::Devices> devices_in_room(const RoomOptions& options, const Rig& rig);
+
 /// This machine as the host of a session in a room.
 class HostedRoom {
  public:

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "core/frame.h"
@@ -12,18 +13,22 @@
 namespace limn::nodes {
 
 /// The topics of a room: one for each message that is sent, in the order of Message.
-enum class Topic { offer, setup, moment, clock_request, clock_answer, order, answer, health };
-inline constexpr std::size_t k_topics = 8;
+enum class Topic { offer, setup, moment, screen_image, clock_request, clock_answer, order, answer, health };
+inline constexpr std::size_t k_topics = std::variant_size_v<Message> - 1;  // without Departure
 
 /// Whether each receiver gets the topic's samples through a writer of its own, so that a slow receiver delays
 /// nobody else.
-constexpr bool is_directed(Topic topic) { return topic == Topic::order || topic == Topic::answer; }
+constexpr bool is_directed(Topic topic) {
+  return topic == Topic::order || topic == Topic::answer || topic == Topic::screen_image;
+}
 /// Whether a sample that is lost is sent again.
 constexpr bool is_reliable(Topic topic) {
-  return is_directed(topic) || topic == Topic::offer || topic == Topic::setup;
+  return topic == Topic::order || topic == Topic::answer || topic == Topic::offer || topic == Topic::setup;
 }
 /// Whether samples wait in the engine until take_waiting() is called; others are reported when they come.
-constexpr bool is_waiting(Topic topic) { return is_directed(topic) || topic == Topic::setup; }
+constexpr bool is_waiting(Topic topic) {
+  return topic == Topic::order || topic == Topic::answer || topic == Topic::setup;
+}
 /// How long a program that is silent is remembered. When it is heard again within this time, what it missed
 /// is sent again; later it is met anew.
 inline constexpr double k_memory_s = 30;
@@ -68,8 +73,8 @@ class Engine {
   virtual ~Engine() = default;
   /// Sends a struct of limn_room.idl to all receivers of the topic. Error: the engine's.
   virtual Status write(Topic topic, const void* sample) = 0;
-  /// Sends to one program, for directed topics; waits up to 2 s until it is connected, and up to 2 s
-  /// until it has room.
+  /// Sends to one program, for directed topics. On reliable ones it waits up to 2 s until the program is
+  /// connected, and up to 2 s until it has room; on others it does not wait.
   virtual Status write_to(const Sender& receiver, Topic topic, const void* sample) = 0;
   /// Connects the directed topics to a program early, so that write_to() need not wait.
   virtual void connect(const Sender& receiver) = 0;

@@ -30,6 +30,7 @@ class WireReading {
   Offer message(const limn_v1_Offer& in);
   Setup message(const limn_v1_Setup& in);
   Moment message(const limn_v1_Moment& in);
+  ScreenImage message(const limn_v1_ScreenImage& in);
   ClockRequest message(const limn_v1_ClockRequest& in);
   ClockAnswer message(const limn_v1_ClockAnswer& in);
   Order message(const limn_v1_Order& in);
@@ -236,6 +237,10 @@ Setup WireReading::message(const limn_v1_Setup& in) {
   return out;
 }
 
+ScreenImage WireReading::message(const limn_v1_ScreenImage& in) {
+  return {text(in.to), text(in.screen), in.number, bytes(in.left), bytes(in.right)};
+}
+
 ClockRequest WireReading::message(const limn_v1_ClockRequest& in) {
   return {text(in.to), in.number, stamp(in.sent_at)};
 }
@@ -280,6 +285,7 @@ Health WireReading::message(const limn_v1_Health& in) {
   out.refreshes = list(in.refreshes, [](const limn_v1_Refresh& item) {
     return Refresh{stamp(item.at), item.period_s};
   });
+  out.screen_problems = list(in.screen_problems, &WireReading::text);
   return out;
 }
 
@@ -304,6 +310,8 @@ Result<Received> from_wire(Topic topic, const void* sample, Stamp arrived_at) {
       return received<limn_v1_Setup>(sample, arrived_at);
     case Topic::moment:
       return received<limn_v1_Moment>(sample, arrived_at);
+    case Topic::screen_image:
+      return received<limn_v1_ScreenImage>(sample, arrived_at);
     case Topic::clock_request:
       return received<limn_v1_ClockRequest>(sample, arrived_at);
     case Topic::clock_answer:

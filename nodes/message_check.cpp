@@ -211,6 +211,13 @@ void check_receiver(const std::string& machine, MessageCheck* to) {
   to->require(is_node_name(machine), "to", "a machine's name");
 }
 
+void check(const ScreenImage& image, MessageCheck* to) {
+  check_receiver(image.to, to);
+  to->text("screen", image.screen);
+  to->bytes("left", image.left);
+  to->bytes("right", image.right);
+}
+
 void check(const ClockRequest& request, MessageCheck* to) { check_receiver(request.to, to); }
 
 void check(const ClockAnswer& answer, MessageCheck* to) { check_receiver(answer.to, to); }
@@ -235,6 +242,9 @@ void check(const Health& health, MessageCheck* to) {
   for (const std::string& problem : health.problems) to->text("problems", problem, k_longest_text);
   to->count("refreshes", health.refreshes);
   for (const Refresh& refresh : health.refreshes) to->finite("refreshes", {refresh.period_s});
+  to->count("screen_problems", health.screen_problems);
+  for (const std::string& problem : health.screen_problems)
+    to->text("screen_problems", problem, k_longest_text);
 }
 
 void check(const Departure& /*departure*/, MessageCheck* to) {

@@ -69,6 +69,14 @@ struct Moment {
   session::FrameDescription frame;  ///< stamps of the host's clock
 };
 
+/// What a screen at a node shows, from the host. Best effort; the newest of each screen wins.
+struct ScreenImage {
+  std::string to = {};      ///< the node
+  std::string screen = {};  ///< its name in the setup's devices
+  std::uint64_t number = 0;
+  std::string left = {}, right = {};  ///< JPEG for each eye; no right one: both eyes get the left one
+};
+
 /// Asks another machine for its time. Best effort.
 struct ClockRequest {
   std::string to;  ///< the machine
@@ -130,12 +138,14 @@ struct Health {
   std::vector<std::string> problems;  ///< sentences for people; empty: all is well
   bool has_no_host = false;           ///< it has been in the room for long enough to know
   std::vector<Refresh> refreshes;     ///< those of its projectors that are known
+  /// Likewise of screens; each begins with the screen's name. The projectors work nevertheless.
+  std::vector<std::string> screen_problems = {};
 };
 
 /// The sender has gone: it said so, or was not heard for as long as its liveliness lasts. Made by the link.
 struct Departure {};
 
-using Message =
-    std::variant<Offer, Setup, Moment, ClockRequest, ClockAnswer, Order, Answer, Health, Departure>;
+using Message = std::
+    variant<Offer, Setup, Moment, ScreenImage, ClockRequest, ClockAnswer, Order, Answer, Health, Departure>;
 
 }  // namespace limn::nodes

@@ -17,6 +17,7 @@
 #include "device/gl_context.h"
 #include "nodes/node_devices.h"
 #include "nodes/node_frames.h"
+#include "nodes/node_screens.h"
 #include "nodes/orders.h"
 
 namespace limn::nodes {
@@ -43,6 +44,7 @@ class NodeLoop {
            AppendLog log)
       : room_(room),
         displays_(desktop),
+        screens_(&displays_),
         cameras_(room),
         loader_(options.fetch, options.work),
         log_(std::move(log)) {
@@ -58,7 +60,9 @@ class NodeLoop {
     load_setup();
     if (auto loaded = loader_.take_loaded()) begin(std::move(*loaded));
     carry_out_orders();
+    screens_.receive(room_->take_screen_images());
     if (const auto moment = room_->take_moment()) show(*moment);
+    screens_.show();
     if (gone_at_) fade();
     report();
   }
@@ -94,6 +98,7 @@ class NodeLoop {
       gone_at_ = now();
       orders_.clear();
       cameras_.close_cameras();
+      screens_.clear();
     }
     host_ = host;
   }
@@ -127,6 +132,7 @@ class NodeLoop {
     drawn_.reset();
     const std::string problem_before = std::exchange(problem_, {});
     frames_.reset();
+    if (loaded) screens_.set_devices(loaded->devices, loaded->session.rig, room_->self().node);
     auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)
                          : Result<std::unique_ptr<NodeFrames>>(loaded.error());
     if (frames) {
@@ -198,6 +204,7 @@ class NodeLoop {
       health.clock_stddev_s = clock->stddev_s;
     }
     if (frames_) frames_->report(clock, &health);
+    screens_.report(&health);
     if (!problem_.empty()) health.problems.push_back(problem_);
     health.has_no_host = !host_ && seconds_between(entered_at_, now()) > k_settled_s;
     if (const Status sent = room_->send(health); !sent) log_warning("node: {}", sent.message());
@@ -205,6 +212,7 @@ class NodeLoop {
 
   Room* room_;
   NodeDisplays displays_;
+  NodeScreens screens_;
   CameraWorker cameras_;
   SetupLoader loader_;
   AppendLog log_;

@@ -8,6 +8,7 @@
 #include "device/devices_file.h"
 #include "device/jpeg.h"
 #include "device/offscreen_display.h"
+#include "nodes/remote_screen.h"
 #include "nodes/ros_camera.h"
 
 namespace limn::nodes {
@@ -17,7 +18,8 @@ constexpr double k_open_limit_s = 10, k_show_limit_s = 2, k_image_limit_s = 5;
 constexpr double k_most_lead_s = 0.1;
 constexpr double k_network_s = 0.004;  // from a description's sending to the node's drawing, for most frames
 
-// Error: the machine is not there, or cannot work with this one.
+}  // namespace
+
 Result<Machine> node_of(const Room& room, const std::string& name, const std::string& device) {
   const std::optional<Machine> node = room.find(name);
   if (!node)
@@ -29,8 +31,6 @@ Result<Machine> node_of(const Room& room, const std::string& name, const std::st
         device, name, version(), node->offer.version);
   return *node;
 }
-
-}  // namespace
 
 Result<std::unique_ptr<RemoteDisplay>> RemoteDisplay::open(Room* room, const device::DisplayConfig& config) {
   std::unique_ptr<RemoteDisplay> out(new RemoteDisplay(room, config));
@@ -100,6 +100,10 @@ Result<Frame> RemoteCamera::next() {
 
 Result<std::unique_ptr<device::Display>> RoomOpener::display(const device::DisplayConfig& config) {
   if (!room_ || config.host.empty()) return local_.display(config);
+  if (std::ranges::find(screens_, config.name) != screens_.end()) {
+    LIMN_TRY(std::unique_ptr<device::Display> screen, RemoteScreen::open(room_, config));
+    return screen;
+  }
   LIMN_TRY(std::unique_ptr<device::Display> display, RemoteDisplay::open(room_, config));
   return display;
 }

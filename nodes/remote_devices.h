@@ -3,13 +3,19 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "device/device_opener.h"
 #include "nodes/room.h"
 
 namespace limn::nodes {
 
-/// A display that is plugged into a node.
+/// A machine of the room by its name, for a device at it. Error: the machine is not there, or has another
+/// version of Limn; the message begins with the device's name.
+Result<Machine> node_of(const Room& room, const std::string& name, const std::string& device);
+
+/// A projector, or a display for a calibration, that is plugged into a node.
 class RemoteDisplay final : public device::Display {
  public:
   /// A display of the node `config.host`. If its size is known, it is opened when it first shows something,
@@ -58,17 +64,20 @@ class RemoteCamera final : public device::CameraSource {
 };
 
 /// Opens devices at the machine that their configuration names: a node of the room, or this one. Cameras
-/// of ROS 2 (`ros:/TOPIC`), too.
+/// of ROS 2 (`ros:/TOPIC`), too. A session's `screens`, by their names, get their images from this machine
+/// (RemoteScreen).
 class RoomOpener final : public device::DeviceOpener {
  public:
   /// Borrows both. `room` may be null: then a device at another machine is an error. `desktop` may be null.
-  RoomOpener(Room* room, const device::Desktop* desktop) : room_(room), local_(desktop) {}
+  RoomOpener(Room* room, const device::Desktop* desktop, std::vector<std::string> screens = {})
+      : room_(room), local_(desktop), screens_(std::move(screens)) {}
   Result<std::unique_ptr<device::Display>> display(const device::DisplayConfig& config) override;
   Result<std::unique_ptr<device::CameraSource>> camera(const device::CameraConfig& config) override;
 
  private:
   Room* room_;
   device::LocalOpener local_;
+  std::vector<std::string> screens_;
 };
 
 }  // namespace limn::nodes

@@ -73,6 +73,9 @@ void Room::note(Received received) {
   } else if (auto* moment = std::get_if<Moment>(&received.message)) {
     if (!is_from_host) return;
     moment_ = std::move(*moment);
+  } else if (auto* image = std::get_if<ScreenImage>(&received.message)) {
+    if (!is_from_host) return;
+    screen_images_[image->screen] = std::move(*image);
   } else if (auto* setup = std::get_if<Setup>(&received.message)) {
     setup_ = {std::move(*setup), from};  // it may come before its sender's offer
   } else if (auto* order = std::get_if<Order>(&received.message)) {
@@ -106,6 +109,7 @@ void Room::note_departure(const Sender& from) {
   if (machine == machines_.end() || !(machine->second.sender == from)) return;  // an earlier run
   if (machine->second.offer.is_host) {
     moment_.reset();
+    screen_images_.clear();
     if (setup_ && setup_->second == from) setup_.reset();
     waiting_orders_.clear();
   }
@@ -151,6 +155,13 @@ bool Room::wait_without_black(Stamp until) {
 std::optional<Moment> Room::take_moment() {
   const std::lock_guard lock(mutex_);
   return std::exchange(moment_, std::nullopt);
+}
+
+std::vector<ScreenImage> Room::take_screen_images() {
+  const std::lock_guard lock(mutex_);
+  std::vector<ScreenImage> out;
+  for (auto& [screen, image] : std::exchange(screen_images_, {})) out.push_back(std::move(image));
+  return out;
 }
 
 std::optional<Setup> Room::take_setup() {

@@ -51,12 +51,15 @@ class Room {
 
   /// For nodes: the host's clock; nullopt before the first answers, and without a host.
   std::optional<ClockEstimate> host_clock() const;
-  /// For nodes: waits until a moment, a setup or an order is there, or the host comes or goes.
+  /// For nodes: waits until a moment, a setup, a screen's image or an order is there, or the host comes or
+  /// goes.
   void wait(std::chrono::nanoseconds limit);
   std::optional<Moment> take_moment();
   /// Waits until then. False: a black frame came before, which take_moment() gives.
   bool wait_without_black(Stamp until);
   std::optional<Setup> take_setup();
+  /// The newest image of each screen that has one that was not taken yet.
+  std::vector<ScreenImage> take_screen_images();
   /// An order, and the host that sent it.
   struct ReceivedOrder {
     Order order;
@@ -85,6 +88,7 @@ class Room {
   std::uint64_t clock_requests_ = 0, orders_ = 0;
   Stamp asked_clock_at_;
   std::optional<Moment> moment_;
+  std::map<std::string, ScreenImage> screen_images_;  // by screen
   std::optional<std::pair<Setup, Sender>> setup_;
   std::vector<ReceivedOrder> waiting_orders_;
   std::map<std::uint64_t, std::optional<Answer>> answers_;  // by order that somebody waits for

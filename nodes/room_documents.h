@@ -14,7 +14,7 @@ struct RoomSubjects {
 std::string governance_document();
 
 /// The permissions document of a room (DDS Security 1.1, 9.4.1.3): both roles may receive everything; a host
-/// may send everything, a node everything but Setup, Moment and Order.
+/// may send everything, a node everything but Setup, Moment, ScreenImage and Order.
 std::string permissions_document(const RoomSubjects& subjects, std::time_t not_before, std::time_t not_after);
 
 }  // namespace limn::nodes

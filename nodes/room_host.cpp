@@ -94,6 +94,8 @@ void RoomHost::apply_edits(const session::SessionMoment& moment) {
     if (!node || !node->health) continue;
     for (const std::string& problem : node->health->problems)
       problems.insert(fmt::format("{}: {}", name, problem));
+    for (const std::string& problem : node->health->screen_problems)
+      problems.insert(fmt::format("{}: {}", name, problem));
   }
   for (std::string& problem : room_->problems()) problems.insert(std::move(problem));
   for (const std::string& problem : problems)

@@ -37,9 +37,12 @@ const std::string* receiver_of(const Message& message) {
       message);
 }
 
-// What a best-effort message replaces: the one of the same kind and sender.
+// What a best-effort message replaces: the one of the same kind and sender, and for the same screen.
 bool is_replaced(const Received& old, const Received& fresh) {
-  return old.message.index() == fresh.message.index() && old.from == fresh.from;
+  const auto* before = std::get_if<ScreenImage>(&old.message);
+  const auto* after = std::get_if<ScreenImage>(&fresh.message);
+  return old.message.index() == fresh.message.index() && old.from == fresh.from &&
+         (!before || !after || before->screen == after->screen);
 }
 
 // Seconds on a clock that also counts while the machine sleeps.

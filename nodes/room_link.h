@@ -43,11 +43,12 @@ class RoomLink {
 
   /// This program's own name and run.
   virtual const Sender& self() const = 0;
-  /// Sends to all machines; ClockRequest, ClockAnswer, Order and Answer are received by the machine `to`
-  /// only. A program sends its Offer first, so that the others know of it, and again when it changes. Setup,
-  /// Moment and Order can be sent by a host only; Setup, Moment and Order come to nodes only. Order and
-  /// Answer wait some seconds until `to` is connected and has taken earlier ones. Error: the content is not
-  /// valid (message_check.h), nobody named `to` is there, or the engine's message. Departure cannot be sent.
+  /// Sends to all machines; ClockRequest, ClockAnswer, ScreenImage, Order and Answer are received by the
+  /// machine `to` only. A program sends its Offer first, so that the others know of it, and again when it
+  /// changes. Setup, Moment, ScreenImage and Order can be sent by a host only, and come to nodes only. Order
+  /// and Answer wait some seconds until `to` is connected and has taken earlier ones. Error: the content is
+  /// not valid (message_check.h), nobody named `to` is there, or the engine's message. Departure cannot be
+  /// sent.
   virtual Status send(const Message& message) = 0;
   /// What has arrived since the last call; waits up to `wait` for something. Of best-effort messages only the
   /// newest of each sender is kept. Own messages are not received.

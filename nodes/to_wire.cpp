@@ -58,6 +58,7 @@ class WireFilling {
   void message(const Offer& in, limn_v1_Offer* out);
   void message(const Setup& in, limn_v1_Setup* out);
   void message(const Moment& in, limn_v1_Moment* out);
+  void message(const ScreenImage& in, limn_v1_ScreenImage* out);
   void message(const ClockRequest& in, limn_v1_ClockRequest* out);
   void message(const ClockAnswer& in, limn_v1_ClockAnswer* out);
   void message(const Order& in, limn_v1_Order* out);
@@ -269,6 +270,14 @@ void WireFilling::message(const Setup& in, limn_v1_Setup* out) {
   });
 }
 
+void WireFilling::message(const ScreenImage& in, limn_v1_ScreenImage* out) {
+  text(in.to, &out->to);
+  text(in.screen, &out->screen);
+  out->number = in.number;
+  bytes(in.left, &out->left);
+  bytes(in.right, &out->right);
+}
+
 void WireFilling::message(const ClockRequest& in, limn_v1_ClockRequest* out) {
   text(in.to, &out->to);
   out->number = in.number;
@@ -314,6 +323,7 @@ void WireFilling::message(const Health& in, limn_v1_Health* out) {
   list(in.refreshes, &out->refreshes, [](const Refresh& item, limn_v1_Refresh* to) {
     *to = {nanoseconds_of(item.at), item.period_s};
   });
+  list(in.screen_problems, &out->screen_problems, &WireFilling::text);
 }
 
 template <class T>
@@ -324,6 +334,8 @@ template <>
 struct WireOf<Setup> : std::type_identity<limn_v1_Setup> {};
 template <>
 struct WireOf<Moment> : std::type_identity<limn_v1_Moment> {};
+template <>
+struct WireOf<ScreenImage> : std::type_identity<limn_v1_ScreenImage> {};
 template <>
 struct WireOf<ClockRequest> : std::type_identity<limn_v1_ClockRequest> {};
 template <>

@@ -81,7 +81,8 @@ void add_live(CLI::App& app, Run& run) {
       ->type_name("SCENE");
   command
       ->add_option("--devices", options->devices,
-                   "File that names the cameras and displays (limn.devices/1); without it a virtual rig")
+                   "File that names the cameras and displays (limn.devices/1); without it and without --room "
+                   "a virtual rig")
       ->type_name("FILE.json");
   command
       ->add_option(

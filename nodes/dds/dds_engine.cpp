@@ -26,7 +26,8 @@ constexpr auto k_longest_match = std::chrono::seconds(2);
 
 // The topics that a role sends, and those that it receives.
 bool is_from_host(Topic topic) {
-  return topic == Topic::setup || topic == Topic::moment || topic == Topic::order;
+  return topic == Topic::setup || topic == Topic::moment || topic == Topic::order ||
+         topic == Topic::screen_image;
 }
 bool is_sent(Topic topic, bool is_host) { return is_host || !is_from_host(topic); }
 bool is_received(Topic topic, bool is_host) { return !is_host || !is_from_host(topic); }
@@ -214,7 +215,7 @@ Result<dds_entity_t> DdsEngine::directed_writer(const Sender& receiver, Topic to
 
 Status DdsEngine::write_to(const Sender& receiver, Topic topic, const void* sample) {
   LIMN_TRY(const dds_entity_t writer, directed_writer(receiver, topic));
-  dds_return_t code = begin_directed(receiver, topic, writer, sample);
+  dds_return_t code = is_reliable(topic) ? begin_directed(receiver, topic, writer, sample) : DDS_RETCODE_OK;
   if (code == DDS_RETCODE_OK) code = dds_write(writer, sample);
   if (code == DDS_RETCODE_OK) return {};
   return error(

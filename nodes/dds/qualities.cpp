@@ -20,7 +20,7 @@ constexpr int32_t k_direct_delivery = 1;
 
 Qos common_qos(Topic topic) {
   Qos qos(dds_create_qos());
-  if (is_directed(topic))
+  if (is_directed(topic) && is_reliable(topic))
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_ALL, 0);
   else
     dds_qset_history(qos.get(), DDS_HISTORY_KEEP_LAST, 1);
@@ -28,7 +28,8 @@ Qos common_qos(Topic topic) {
     dds_qset_reliability(qos.get(), DDS_RELIABILITY_RELIABLE, k_longest_write);
   } else {
     dds_qset_reliability(qos.get(), DDS_RELIABILITY_BEST_EFFORT, 0);
-    dds_qset_transport_priority(qos.get(), k_direct_delivery);
+    // A screen's image is large, and nothing else may wait for it.
+    if (topic != Topic::screen_image) dds_qset_transport_priority(qos.get(), k_direct_delivery);
   }
   if (is_reliable(topic) && !is_directed(topic)) {
     dds_qset_durability(qos.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
@@ -73,6 +74,8 @@ TopicDescription description_of(Topic topic) {
       return {"limn_v1_setup", &limn_v1_Setup_desc};
     case Topic::moment:
       return {"limn_v1_moment", &limn_v1_Moment_desc};
+    case Topic::screen_image:
+      return {"limn_v1_screen_image", &limn_v1_ScreenImage_desc};
     case Topic::clock_request:
       return {"limn_v1_clock_request", &limn_v1_ClockRequest_desc};
     case Topic::clock_answer:
@@ -97,7 +100,7 @@ Qos writer_qos(Topic topic, double liveliness_s) {
 Qos reader_qos(Topic topic) {
   Qos qos = common_qos(topic);
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
-  if (is_directed(topic))
+  if (is_directed(topic) && is_reliable(topic))
     dds_qset_resource_limits(qos.get(), k_most_waiting, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return qos;
 }

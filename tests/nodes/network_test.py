@@ -10,6 +10,7 @@ Exit code 77: namespaces are not permitted here.
 import argparse
 import bisect
 import csv
+import json
 import os
 import subprocess
 import sys
@@ -65,6 +66,18 @@ def images_are_the_hosts(machines):
         late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows[10:])
         print(f"{node}: {len(rows)} images equal; from the wanted moment: median {late_ms[len(late_ms) // 2]:.2f} ms, "
               f"99 % {late_ms[int(0.99 * len(late_ms))]:.2f} ms")
+
+
+def a_screen_at_a_node_shows_images(machines):
+    """One node has a screen, too, and no image of a projector differs or is missing by it."""
+    path = machines.folder / "devices.json"
+    devices = json.loads(path.read_text())
+    devices["displays"].append({"name": "screen0", "host": "left", "monitor": "offscreen", "size": [1280, 720]})
+    path.unlink()  # it is a link to the file of all scenarios
+    path.write_text(json.dumps(devices))
+    images_are_the_hosts(machines)
+    log = (machines.folder / "left.log").read_text()
+    assert "screen0 shows the host's images" in log and "screen0:" not in log, log
 
 
 def nobody_freezes_on_a_bad_network(machines):
@@ -241,7 +254,8 @@ SCENARIOS = [images_are_the_hosts, nobody_freezes_on_a_bad_network, machines_mee
              machines_meet_by_ipv6, *failures.SCENARIOS,
              a_blackout_reaches_all_and_one_recording_replays_the_room, a_second_host_is_refused]
 
-BY_NAME = [twenty_blackouts, a_thousand_frames_of_three_nodes, placement_on_a_network, placement_on_a_bad_network, failures.a_node_sleeps,
+BY_NAME = [twenty_blackouts, a_thousand_frames_of_three_nodes, placement_on_a_network, placement_on_a_bad_network,
+           a_screen_at_a_node_shows_images, failures.a_node_sleeps,
            failures.a_large_scene_comes_while_frames_run]  # long ones
 
 

@@ -97,7 +97,10 @@ class NodeTest : public ::testing::Test {
   void open_host() {
     const Imager& projector = setup_.rig.projectors[1];
     device::Devices devices;
-    devices.displays = {offscreen(projector.name, "left", {projector.width, projector.height})};
+    devices.displays = {
+        offscreen(projector.name, "left", {projector.width, projector.height}),
+        // It cannot be opened, because nodes of tests have no desktop.
+        {.name = "screen0", .host = "left", .kind = device::DisplayKind::window, .size = {64, 36}}};
     host_ = std::make_unique<Room>(std::make_unique<test::MemoryLink>(&room_, "host"));
     client_ = RoomHost::open(host_.get(), &files_, devices, folder_ / "host", AppendLog(), &setup_).value();
     ASSERT_TRUE(host_->offer({.is_host = true, .version = std::string(version())}).ok());
@@ -121,6 +124,17 @@ class NodeTest : public ::testing::Test {
   const scene::ShowState& show_state() {
     if (show_state_.slots.empty()) show_state_ = scene::initial_show_state(setup_.scene);
     return show_state_;
+  }
+  // Whether the node says in time that its screen shows no images.
+  bool reports_the_screen() {
+    const auto screen =
+        RoomOpener(host_.get(), nullptr, {"screen0"})
+            .display(
+                {.name = "screen0", .host = "left", .kind = device::DisplayKind::window, .size = {64, 36}});
+    return screen && holds_within(5s, [&] {
+             const auto shown_at = (*screen)->show(cv::Mat(36, 64, CV_8UC3, cv::Scalar::all(50)));
+             return !shown_at && shown_at.message().starts_with("left: screen0: expected a desktop");
+           });
   }
   std::uint64_t shown_by(const std::string& node) const {
     const auto machine = host_->find(node);
@@ -168,6 +182,7 @@ TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
         send();
         return shown_by("left") > before;
       }));
+      EXPECT_TRUE(reports_the_screen());
       for (int i = 0; i < 10; ++i) {
         rig_.move("prototype",
                   Pose(rig_.world().world_from_prototype.rotation,

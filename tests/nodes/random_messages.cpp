@@ -124,6 +124,10 @@ void fields(F& f, Moment& x) {
   f(x.setup), f(x.frame);
 }
 template <class F>
+void fields(F& f, ScreenImage& x) {
+  f.machine(x.to), f(x.screen), f(x.number), f.bytes(x.left), f.bytes(x.right);
+}
+template <class F>
 void fields(F& f, ClockRequest& x) {
   f.machine(x.to), f(x.number), f(x.sent_at);
 }
@@ -146,7 +150,7 @@ void fields(F& f, Refresh& x) {
 template <class F>
 void fields(F& f, Health& x) {
   f(x.shown), f(x.missed), f(x.latency_s), f(x.draw_ms), f(x.late_ms), f(x.clock_offset_s),
-      f(x.clock_stddev_s), f(x.problems), f(x.has_no_host), f(x.refreshes);
+      f(x.clock_stddev_s), f(x.problems), f(x.has_no_host), f(x.refreshes), f(x.screen_problems);
 }
 template <class F>
 void fields(F& /*f*/, Departure& /*x*/) {}
@@ -303,8 +307,8 @@ class Printing {
 }  // namespace
 
 Message random_message(std::size_t kind, std::uint64_t seed, const std::string& to) {
-  const std::array<Message, 9> kinds = {Offer{},       Setup{}, Moment{}, ClockRequest{},
-                                        ClockAnswer{}, Order{}, Answer{}, Health{}};
+  const std::array<Message, 10> kinds = {Offer{},       Setup{}, Moment{}, ScreenImage{}, ClockRequest{},
+                                         ClockAnswer{}, Order{}, Answer{}, Health{}};
   Message message = kinds.at(kind);
   Filling filling(seed, to);
   std::visit([&](auto& one) { fields(filling, one); }, message);

@@ -12,6 +12,12 @@ namespace limn::test {
 /// message. It is for the machine `to`.
 nodes::Message random_message(std::size_t kind, std::uint64_t seed, const std::string& to);
 
+/// The kind of a message's type.
+template <class Kind>
+std::size_t kind_of() {
+  return nodes::Message(Kind{}).index();
+}
+
 /// All fields as text; doubles with all their bits. Equal texts mean equal messages.
 std::string to_text(const nodes::Message& message);
 

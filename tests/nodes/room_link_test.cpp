@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <map>
 #include <set>
 #include <thread>
 
@@ -48,14 +49,15 @@ TEST(RoomLink, GivesALateComerTheLastOfferAndSetup) {
     offer.version = version;
     ASSERT_TRUE(host->send(offer));
   }
-  ASSERT_TRUE(host->send(test::random_message(1, 5, "beta")));
+  ASSERT_TRUE(host->send(test::random_message(test::kind_of<nodes::Setup>(), 5, "beta")));
   std::this_thread::sleep_for(200ms);
   // The late comer here is the other process, so it reports what it got by its answers.
   const Peer peer(room.folder(), "beta", "node", "report");
   const auto answer = wait_for<Answer>(*host, "beta");
   ASSERT_TRUE(answer);
   EXPECT_EQ(std::get<Answer>(answer->message).error, "3");
-  EXPECT_EQ(std::get<Answer>(answer->message).image, test::to_text(test::random_message(1, 5, "beta")));
+  EXPECT_EQ(std::get<Answer>(answer->message).image,
+            test::to_text(test::random_message(test::kind_of<nodes::Setup>(), 5, "beta")));
 }
 
 // Asks the peer for a message until it comes: what is best effort is lost while the two are not yet
@@ -79,7 +81,9 @@ TEST(RoomLink, DeliversEveryMessageToTheBit) {
   const auto host = room.open_link("alpha", RoomRole::host);
   const Peer peer(room.folder(), "beta", "node", "replies", k_seed);
   ASSERT_TRUE(wait_for<Offer>(*host, "beta"));
-  for (const std::size_t kind : {0u, 3u, 4u, 6u, 7u}) {  // those that a node may send
+  for (const std::size_t kind :
+       {test::kind_of<Offer>(), test::kind_of<ClockRequest>(), test::kind_of<ClockAnswer>(),
+        test::kind_of<Answer>(), test::kind_of<Health>()}) {  // those that a node may send
     for (std::uint64_t i = 0; i < 20; ++i) {
       const auto got = requested(*host, kind, i);
       ASSERT_TRUE(got) << "kind " << kind;
@@ -96,12 +100,13 @@ TEST(RoomLink, DeliversWhatAHostSendsToTheBit) {
   ASSERT_TRUE(node->send(Offer{}));
   const Peer host(room.folder(), "beta", "host", "all", k_seed);
   std::set<std::string> expected, got;
-  for (const std::size_t kind : {1u, 2u, 5u})
+  const std::set<std::size_t> kinds = {test::kind_of<nodes::Setup>(), test::kind_of<Moment>(),
+                                       test::kind_of<ScreenImage>(), test::kind_of<Order>()};
+  for (const std::size_t kind : kinds)
     for (std::uint64_t i = 0; i < 20; ++i)
       expected.insert(test::to_text(test::random_message(kind, k_seed + i, "alpha")));
   wait_for(*node, [&](const Received& one) {
-    const std::size_t kind = one.message.index();
-    if (kind == 1 || kind == 2 || kind == 5) got.insert(test::to_text(one.message));
+    if (kinds.contains(one.message.index())) got.insert(test::to_text(one.message));
     return got.size() == expected.size();
   });
   EXPECT_EQ(got, expected);
@@ -121,6 +126,23 @@ TEST(RoomLink, TheNewestMomentWins) {
     EXPECT_LT(seconds_between(moment->frame.painted_at, now()), 0.1);
   }
   EXPECT_EQ(moments, 1);
+}
+
+// Two screens at one node: neither loses its image to the other, and what is sent meanwhile comes in time.
+TEST(RoomLink, TheNewestImageOfEachScreenWins) {
+  const ARoom room;
+  const auto node = room.open_link("alpha", RoomRole::node);
+  const Peer host(room.folder(), "beta", "host", "screens", 100'000);
+  ASSERT_TRUE(wait_for<ScreenImage>(*node, "beta"));
+  std::this_thread::sleep_for(400ms);
+  std::map<std::string, int> images;
+  for (const Received& received : node->take_messages(0ns)) {
+    const auto* image = std::get_if<ScreenImage>(&received.message);
+    if (!image) continue;
+    ++images[image->screen];
+    EXPECT_EQ(image->left, std::string(100'000, static_cast<char>(image->number)));
+  }
+  EXPECT_EQ(images, (std::map<std::string, int>{{"left wall", 1}, {"right wall", 1}}));
 }
 
 TEST(RoomLink, SaysWhoWasKilledAndWhoIsBack) {
@@ -260,6 +282,7 @@ TEST(RoomLink, ANodeCannotSendWhatOnlyAHostMay) {
   const auto node = room.open_link("alpha", RoomRole::node);
   EXPECT_FALSE(node->send(nodes::Setup{}));
   EXPECT_FALSE(node->send(Moment{}));
+  EXPECT_FALSE(node->send(ScreenImage{.to = "alpha"}));
   EXPECT_TRUE(node->send(Health{}));
 }
 

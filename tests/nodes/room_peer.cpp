@@ -3,6 +3,7 @@
 //
 //   offer NUMBER     offers itself as version NUMBER; answers orders with their own image, and clock requests
 //   moments BYTES    offers itself and sends a moment of that size 60 times a second
+//   screens BYTES    as a host: sends images of that size for two screens of each node, 15 times a second
 //   replies SEED     offers itself; answers order K + 16 I by random_message(K, SEED + I)
 //   report           offers itself; answers the host's setup by the version of its offer and the setup as
 //   text all SEED         as a host: sends random_message(K, SEED + I) of the kinds that a host alone may
@@ -13,6 +14,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <set>
 #include <string>
 #include <thread>
 
@@ -71,10 +73,25 @@ void send_all(RoomLink& link, std::uint64_t seed) {
     for (const Received& received : link.take_messages(std::chrono::milliseconds(10)))
       if (std::holds_alternative<Offer>(received.message)) node = received.from.node;
   for (std::uint64_t round = 0; !input_has_ended(); ++round)
-    for (const std::size_t kind : {1u, 2u, 5u}) {
+    for (const std::size_t kind : {test::kind_of<Setup>(), test::kind_of<Moment>(),
+                                   test::kind_of<ScreenImage>(), test::kind_of<Order>()}) {
       send_or_warn(link, test::random_message(kind, seed + round % 20, node));
       std::this_thread::sleep_for(std::chrono::milliseconds(20));  // so that no newer one replaces it
     }
+}
+
+void send_screen_images(RoomLink& link, std::uint64_t bytes) {
+  std::set<std::string> nodes;
+  for (std::uint64_t number = 1; !input_has_ended(); ++number) {
+    for (const Received& received : link.take_messages(std::chrono::milliseconds(66)))
+      if (std::holds_alternative<Offer>(received.message)) nodes.insert(received.from.node);
+    for (const std::string& node : nodes)
+      for (const char* screen : {"left wall", "right wall"})
+        send_or_warn(link, ScreenImage{.to = node,
+                                       .screen = screen,
+                                       .number = number,
+                                       .left = std::string(bytes, static_cast<char>(number))});
+  }
 }
 
 int run(const RoomLinkOptions& options, const std::string& what, std::uint64_t number) {
@@ -92,6 +109,7 @@ int run(const RoomLinkOptions& options, const std::string& what, std::uint64_t n
   std::fflush(stdout);
   if (what == "report") report_host(**link);
   if (what == "all") send_all(**link, number);
+  if (what == "screens") send_screen_images(**link, number);
   Stamp next = now();
   for (std::uint64_t frame = 1; !input_has_ended(); ++frame) {
     if (what != "moments") {

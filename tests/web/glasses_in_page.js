@@ -8,8 +8,11 @@
     device_frame = null, // iwer's next frame
     xr = null,
     layer = null,
-    gl = null;
-  const traffic = { frames: 0, sent: 0, others: 0, largest: { glasses: 0, glasses_parts: 0 } }, // bytes
+    gl = null,
+    camera_texture = null,
+    photograph = null; // what the glasses' camera sees in the next frame, as an ImageBitmap whose last row comes first
+  const k_camera = { width: 960, height: 960 };
+  const traffic = { frames: 0, sent: 0, pictures: 0, others: 0, largest: { glasses: 0, glasses_parts: 0 } }, // bytes
     places = [];
 
   const device = new IWER.XRDevice(IWER.metaQuest3, { stereoEnabled: true, fovy: (55 * Math.PI) / 180, ipd: 0.063 });
@@ -69,13 +72,30 @@
   navigator.xr.requestSession = async (mode, options) => {
     const gives_depth = options.depthSensing.usagePreference.includes(granted.depth_usage);
     const features = options.optionalFeatures.filter((name) => granted.features.includes(name));
+    const has_camera = options.optionalFeatures.includes("camera-access") && granted.features.includes("camera-access");
     xr = await request(mode, {
-      optionalFeatures: gives_depth ? [...features, "depth-sensing"] : features,
+      optionalFeatures: (gives_depth ? [...features, "depth-sensing"] : features).filter((name) => name !== "camera-access"),
       depthSensing: { ...options.depthSensing, usagePreference: [granted.depth_usage] },
     });
+    if (has_camera) xr.enabledFeatures.push("camera-access");
     places.length = 0;
     device.sem.hand = null;
     return xr;
+  };
+  // The camera is at the left eye, with its lens. A frame without a new photograph has no image of it.
+  Object.defineProperty(XRView.prototype, "camera", {
+    get() {
+      return xr?.enabledFeatures.includes("camera-access") && this.eye !== "right" ? k_camera : undefined;
+    },
+  });
+  XRWebGLBinding.prototype.getCameraImage = () => {
+    if (!photograph) return null;
+    camera_texture ??= gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, camera_texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, photograph);
+    gl.bindTexture(gl.TEXTURE_2D, null);
+    photograph = null;
+    return camera_texture;
   };
   const Layer = window.XRWebGLLayer;
   window.XRWebGLLayer = class extends Layer {
@@ -98,6 +118,7 @@
     }
     send(data) {
       traffic.sent += data.length ?? data.byteLength;
+      traffic.pictures += typeof data !== "string";
       super.send(data);
     }
   };
@@ -117,6 +138,19 @@
       return places.at(-1)?.state ?? "none";
     },
     traffic: () => structuredClone(traffic),
+    // A step in which the glasses' camera takes this photograph (base64 of a PNG). Returns the state and whether its
+    // picture was sent.
+    async step_with_photograph(now_s, at_s, png) {
+      const bytes = Uint8Array.from(atob(png), (letter) => letter.charCodeAt(0));
+      const how = { imageOrientation: "flipY", colorSpaceConversion: "none" };
+      photograph = await createImageBitmap(new Blob([bytes], { type: "image/png" }), how);
+      const before = traffic.pictures;
+      const state = await this.step(now_s, at_s);
+      const is_taken = photograph === null;
+      photograph = null;
+      for (let i = 0; is_taken && traffic.pictures === before && i < 300; ++i) await new Promise((done) => setTimeout(done, 10));
+      return { state, is_sent: traffic.pictures > before };
+    },
 
     // The pixels of each eye that the page draws in a frame, as web_glasses_room's masks, first row first.
     capture: () =>

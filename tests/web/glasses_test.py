@@ -1,14 +1,16 @@
 """Glasses on the page: Chromium with an emulated headset (npm package iwer), against a served session of the studio.
 
-    glasses_test.py --room web_glasses_room --out FOLDER
+    glasses_test.py --room web_glasses_room --out FOLDER [--only marker|camera|camera-soon]
 
-The script moves the clocks of the room and of the headset, a step for each frame, so that nothing depends on how fast
+A person wears them who has a marker on the glasses (`marker`), and another one whose glasses have none, but give the page
+photographs of their camera (`camera`; `camera-soon`: for some seconds only). The script moves the clocks of the room and of the headset, a step for each frame, so that nothing depends on how fast
 the machine draws. Seconds in results are seconds of the person's motion.
 iwer is installed into FOLDER with npm; without npm or its registry the checks that need it are skipped (code 77).
 Screenshots are written to FOLDER.
 """
 
 import argparse
+import base64
 import contextlib
 import json
 import math
@@ -29,6 +31,10 @@ MOST_OFF_PX, LEAST_IOU, MOST_BYTES = 2.0, 0.98, 2000
 READY = "The glasses know where they are in the room."
 SIZE = (1280, 640)  # of both eyes
 IPD_M = 0.063
+# The glasses' camera is at the left eye and has its field of view (glasses_in_page.js). It takes a photograph in every
+# second frame; frames are twice as long, because nothing is measured between two photographs.
+SOON_S, MOST_OFF_SOON_MM, MOST_OFF_SOON_DEG = 3.0, 3.0, 0.3
+CAMERA_PX, CAMERA_FOCAL_PX, CAMERA_STEP_S = 960, 480 / math.tan(math.radians(55 / 2)), 1 / 15
 
 
 def expect(is_so, what, found=""):
@@ -61,9 +67,11 @@ def installed_iwer(folder):
 class Room:
     """web_glasses_room, and its answers."""
 
-    def __init__(self, program, folder):
+    def __init__(self, program, folder, *how):
+        os.makedirs(folder, exist_ok=True)
         self.log = open(os.path.join(folder, "room.log"), "w")
-        self.process = subprocess.Popen([program, folder], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.log, text=True)
+        self.process = subprocess.Popen([program, folder, *how], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.log,
+                                        text=True)
         self.invitation = self._answer()
         self.url = self.invitation["url"].rstrip("/")
         with open(os.path.join(folder, "path.json")) as file:
@@ -152,6 +160,8 @@ def difference(one, two):
 
 
 class Checks:
+    step_s = STEP_S
+
     def __init__(self, room, driver, iwer, out):
         self.room, self.driver, self.iwer, self.out, self.measured = room, driver, iwer, out, {}
         self.now_s = self.at_s = 0.0  # the session's clock; where in the walk the person is
@@ -181,14 +191,14 @@ class Checks:
 
     def step(self, browser, at_s):
         """The person is at a moment of the walk, a frame's time later. Returns the state that the page was told last."""
-        self.now_s, self.at_s = self.now_s + STEP_S, at_s
+        self.now_s, self.at_s = self.now_s + self.step_s, at_s
         self.room.ask("step", f"{self.now_s:.6f}", f"{at_s:.6f}")
         return browser.script_async("return limn_glasses.step(...args);", self.now_s, at_s)
 
     def walk(self, browser, until_s):
         """The person walks on until that moment."""
         while self.at_s < until_s - 1e-6:
-            yield self.step(browser, min(until_s, self.at_s + STEP_S))
+            yield self.step(browser, min(until_s, self.at_s + self.step_s))
 
     def stand(self, browser, what, condition):
         """The person stands still until something is so."""
@@ -217,6 +227,10 @@ class Checks:
             state = self.step(browser, 0)
         expect(state == "looking_round", "that the glasses are not placed before the head moves", state)
         browser.screenshot(os.path.join(self.out, "looking-round.png"))
+        self.place_is_found(browser)
+
+    def place_is_found(self, browser):
+        """The person looks round; the glasses are registered in time, and then the eyes are where they are."""
         registered_s = self.measured["registered_s"] = round(self.look_round(browser), 2)
         for _ in self.walk(browser, MOST_REGISTER_S):
             pass
@@ -376,13 +390,16 @@ class Checks:
         self._run(self.without_webxr_the_window_is_offered_and_why)
         if not self.iwer:
             return SKIPPED
+        return self.in_glasses(self.the_glasses_find_the_room, self.parts_are_drawn_where_they_are, self.tracked_hands_hide_parts,
+                               self.depth_hides_parts, self.traffic_is_small, self.sleep_is_seen_by_all,
+                               self.depth_by_texture_hides_parts, self.what_hides_no_parts_is_said,
+                               self.taking_them_off_changes_no_projector)
+
+    def in_glasses(self, *checks):
         with open(os.path.join(HERE, "glasses_in_page.js")) as file:
             driver = file.read()
         with self.page(self.iwer, driver) as browser:
-            for check in (self.the_glasses_find_the_room, self.parts_are_drawn_where_they_are, self.tracked_hands_hide_parts,
-                          self.depth_hides_parts, self.traffic_is_small, self.sleep_is_seen_by_all,
-                          self.depth_by_texture_hides_parts, self.what_hides_no_parts_is_said,
-                          self.taking_them_off_changes_no_projector):
+            for check in checks:
                 try:
                     self._run(check, browser)
                 except Failed:
@@ -399,22 +416,100 @@ class Checks:
         print(f"passed {check.__name__} ({time.monotonic() - at:.1f} s)", flush=True)
 
 
+class CameraChecks(Checks):
+    """Glasses without a marker, which the room finds by the photographs of their own camera."""
+
+    step_s = CAMERA_STEP_S
+
+    def __init__(self, *given):
+        super().__init__(*given)
+        self.is_open, self.steps, self.sent = True, 0, 0
+
+    def step(self, browser, at_s):
+        self.steps += 1
+        if not self.is_open or self.steps % 2:
+            return super().step(browser, at_s)
+        self.now_s, self.at_s = self.now_s + self.step_s, at_s
+        taken = self.room.ask("photograph", f"{at_s:.6f}", -IPD_M / 2, CAMERA_PX, CAMERA_FOCAL_PX)
+        with open(taken["photograph"], "rb") as file:
+            png = base64.b64encode(file.read()).decode()
+        self.room.ask("step", f"{self.now_s:.6f}", f"{at_s:.6f}")
+        found = browser.script_async("return limn_glasses.step_with_photograph(...args);", self.now_s, at_s, png)
+        self.sent += found["is_sent"]
+        looked_at = self.room.ask("located", self.sent)
+        expect(looked_at["looked_at"] == self.sent, f"that the room looks at {self.sent} photographs", looked_at)
+        self.measured |= {"photographs": self.sent, "located": looked_at["located"]}
+        return found["state"]
+
+    def the_camera_finds_the_room(self, browser):
+        self.put_on(browser)
+        self.place_is_found(browser)
+
+    def put_on(self, browser):
+        browser.script("limn_glasses.set_path(arguments[0])", self.room.path)
+        browser.script("limn_glasses.grant('cpu-optimized', ['local-floor', 'hand-tracking', 'camera-access'])")
+        browser.click("#glasses")
+        self.is_open = False  # the camera is covered
+        self.stand(browser, "words on what to do", lambda: "Look at the prototype" in browser.text("#glasses-why"))
+        expect(self.step(browser, 0) == "waiting", "that the glasses are not placed without a photograph", self.measured)
+        place = browser.script("return limn_glasses.places.at(-1)")
+        expect((place["marker"], place["markers"]) == ("camera", ["camera"]), "glasses by their camera", place)
+        browser.screenshot(os.path.join(self.out, "waiting.png"))
+        self.is_open = True
+
+    def parts_are_soon_where_they_are(self, browser):
+        self.put_on(browser)
+        self.measured["registered_s"] = round(self.look_round(browser), 2)
+        for _ in self.walk(browser, SOON_S):
+            pass
+        self.stand(browser, "all parts on the page", lambda: browser.text("#glasses-why") == READY)
+        self.draw_parts(browser, "full")
+        offs, offs_px = [], []
+        for eye in self.capture(browser):
+            true_eye = self.true_eye(eye)
+            offs.append(difference(pose_product(eye["world_from_feed"], eye["feed_from_view"]), true_eye))
+            there = Mask(self.true_masks(eye, true_eye)["full"], eye["width"])
+            self.save(f"soon-{eye['eye']}", eye, there)
+            expect(there.area() > 200, "something to see", there.area())
+            offs_px.append(round(offset_px(Mask(eye["bits"], eye["width"]), there), 2))
+        self.measured |= {"eye_off_mm_deg": [[round(value, 3) for value in off] for off in offs], "off_px": offs_px}
+        expect(all(mm <= MOST_OFF_SOON_MM and degrees <= MOST_OFF_SOON_DEG for mm, degrees in offs),
+               f"the eyes within {MOST_OFF_SOON_MM} mm and {MOST_OFF_SOON_DEG} degrees", offs)
+        expect(max(offs_px) <= MOST_OFF_PX, f"at most {MOST_OFF_PX} px", offs_px)
+
+    def soon(self):
+        return self.in_glasses(self.parts_are_soon_where_they_are) if self.iwer else SKIPPED
+
+    def all(self):
+        if not self.iwer:
+            return SKIPPED
+        return self.in_glasses(self.the_camera_finds_the_room, self.parts_are_drawn_where_they_are,
+                               self.taking_them_off_changes_no_projector)
+
+
 def main():
     parser = argparse.ArgumentParser()
     for name in ("room", "out"):
         parser.add_argument(f"--{name}", required=True)
+    parser.add_argument("--only", choices=("marker", "camera", "camera-soon"))
     options = parser.parse_args()
     os.makedirs(options.out, exist_ok=True)
     iwer = installed_iwer(options.out)
-    with contextlib.closing(Room(options.room, options.out)) as room, contextlib.closing(Driver()) as driver:
-        checks = Checks(room, driver, iwer, options.out)
-        try:
-            code = checks.all()
-        except Failed as failure:
-            print(f"FAILED: {failure}\nmeasured: {checks.measured}\nsee {options.out}")
-            return 1
-        print(json.dumps(checks.measured))
-        return code
+    code = 0
+    for kind, way in (("marker", []), ("camera", ["camera"])):
+        is_soon = kind == "camera" and options.only == "camera-soon"
+        if options.only not in (None, kind) and not is_soon:
+            continue
+        out = os.path.join(options.out, *way)
+        with contextlib.closing(Room(options.room, out, *way)) as room, contextlib.closing(Driver()) as driver:
+            checks = (CameraChecks if way else Checks)(room, driver, iwer, out)
+            try:
+                code = max(code, checks.soon() if is_soon else checks.all())
+            except Failed as failure:
+                print(f"FAILED: {failure}\nmeasured: {checks.measured}\nsee {out}")
+                return 1
+            print(kind, json.dumps(checks.measured))
+    return code
 
 
 if __name__ == "__main__":
