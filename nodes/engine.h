@@ -12,8 +12,8 @@
 namespace limn::nodes {
 
 /// The topics of a room: one for each message that is sent, in the order of Message.
-enum class Topic { offer, setup, moment, clock_request, clock_answer, order, answer, health };
-inline constexpr std::size_t k_topics = 8;
+enum class Topic { offer, setup, moment, clock_request, clock_answer, order, answer, health, detections };
+inline constexpr std::size_t k_topics = 9;
 
 /// Whether each receiver gets the topic's samples through a writer of its own, so that a slow receiver delays
 /// nobody else.

@@ -9,6 +9,7 @@
 
 #include "core/frame.h"
 #include "session/drawing/frame_description.h"
+#include "tracker/cameras/camera_detections.h"
 
 namespace limn::nodes {
 
@@ -122,10 +123,16 @@ struct Health {
   std::vector<std::string> problems;  ///< sentences for people; empty: all is well
 };
 
+/// What an image of a node's camera shows. Best effort; the newest of each camera wins.
+struct Detections {
+  std::uint64_t setup = 0;          ///< the Setup::revision whose markers and lens were used
+  tracker::CameraDetections found;  ///< stamps of the host's clock
+};
+
 /// The sender has gone: it said so, or was not heard for as long as its liveliness lasts. Made by the link.
 struct Departure {};
 
-using Message =
-    std::variant<Offer, Setup, Moment, ClockRequest, ClockAnswer, Order, Answer, Health, Departure>;
+using Message = std::
+    variant<Offer, Setup, Moment, ClockRequest, ClockAnswer, Order, Answer, Health, Detections, Departure>;
 
 }  // namespace limn::nodes

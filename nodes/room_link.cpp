@@ -37,9 +37,11 @@ const std::string* receiver_of(const Message& message) {
       message);
 }
 
-// What a best-effort message replaces: the one of the same kind and sender.
+// What a best-effort message replaces: the one of the same kind, sender and camera.
 bool is_replaced(const Received& old, const Received& fresh) {
-  return old.message.index() == fresh.message.index() && old.from == fresh.from;
+  if (old.message.index() != fresh.message.index() || old.from != fresh.from) return false;
+  const auto* before = std::get_if<Detections>(&old.message);
+  return !before || before->found.camera == std::get<Detections>(fresh.message).found.camera;
 }
 
 // Seconds on a clock that also counts while the machine sleeps.

@@ -20,7 +20,6 @@ constexpr int k_known_after = 5;
 constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.005, k_still_rad = 5 * std::numbers::pi / 180;
 constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
-constexpr double k_once_s = 0.4;  // gestures of two cameras within this time are one use
 
 // The families of all bodies and controls.
 std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body> bodies) {
@@ -59,9 +58,8 @@ Result<Perception> Perception::create(const scene::Scene& scene,
   out.constellations_ = scene::constellations(scene);
   out.loose_size_m_ = scene::first_marker_size_m(scene);
   for (const Imager& camera : rig.cameras)
-    out.cameras_.push_back({.detector = {watched, camera.lens, tracker::encoding_of(rig, camera)},
-                            .controls = std::vector<tracker::GestureReading>(scene.controls.size())});
-  out.used_at_.resize(scene.controls.size());
+    out.detectors_.emplace_back(watched, camera.lens, tracker::encoding_of(rig, camera));
+  out.uses_.emplace(rig.cameras.size(), scene.controls.size());
   out.percepts_.frames.resize(rig.cameras.size());
   out.percepts_.detections.resize(rig.cameras.size());
   for (const tracker::FeedSetup& feed : options.feeds) out.feeds_.emplace_back(feed);
@@ -94,7 +92,8 @@ const Percepts& Perception::watch(std::span<const Frame> frames, const FeedInput
     note_found(cameras.back(), sent);
   }
   for (const Frame& image : input.images) percepts_.frames[number_of(image.camera)] = image;
-  for (std::size_t i = 0; i < cameras.size(); ++i) read_gestures(cameras[i], *found[i]);
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    std::ranges::copy(uses_->read(cameras[i], *found[i]), std::back_inserter(percepts_.uses));
   percepts_.detect_ms = milliseconds_since(begun);
 
   note_loose(cameras);
@@ -169,8 +168,8 @@ std::size_t Perception::number_of(const std::string& name) const {
 }
 
 const tracker::CameraDetections& Perception::detect(std::size_t camera, const Frame& frame) {
-  return cameras_[camera].detector.detect(frame, [&](const MarkerName& used) {
-    for (std::size_t i = 0; i < cameras_.size(); ++i)
+  return detectors_[camera].detect(frame, [&](const MarkerName& used) {
+    for (std::size_t i = 0; i < detectors_.size(); ++i)
       for (const tracker::Detection& detection : percepts_.detections[i])
         if (i != camera && tracker::is_marker(detection.marker, used)) return true;
     return false;
@@ -230,34 +229,6 @@ void Perception::follow_loose() {
   }
   std::stable_sort(percepts_.loose.begin(), percepts_.loose.end(),
                    [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
-}
-
-// A control is used when one camera sees the gesture and no other camera sees the marker uncovered. If
-// several controls are hidden together, only the one hidden last counts: the arm hides the others on the
-// hand's way.
-void Perception::read_gestures(std::size_t camera, const tracker::CameraDetections& found) {
-  Camera& state = cameras_[camera];
-  if (found.controls.size() != state.controls.size()) return;  // a node has another scene still
-  const bool is_counted_on = std::exchange(state.counted_by, found.run) == found.run;
-  const auto before = std::exchange(state.controls, found.controls);
-  for (std::size_t i = 0; i < before.size() && is_counted_on; ++i) {
-    const tracker::GestureReading& reading = found.controls[i];
-    const int forward = reading.forward - before[i].forward, backward = reading.backward - before[i].backward;
-    if (forward + backward <= 0) continue;
-    const bool is_seen_elsewhere =
-        !reading.is_seen && std::any_of(cameras_.begin(), cameras_.end(), [&](const Camera& other) {
-          return &other != &state && other.controls[i].is_seen;
-        });
-    const bool is_arms = std::ranges::any_of(found.controls, [&](const tracker::GestureReading& other) {
-      return reading.hidden_since && other.hidden_since > reading.hidden_since;
-    });
-    const Stamp at = found.captured_at;
-    const bool is_known = used_at_[i] != Stamp{} && seconds_between(used_at_[i], at) < k_once_s;
-    if (is_seen_elsewhere || is_arms || is_known) continue;
-    used_at_[i] = at;
-    for (int use = 0; use < forward; ++use) percepts_.uses.push_back({i, 1});
-    for (int use = 0; use < backward; ++use) percepts_.uses.push_back({i, -1});
-  }
 }
 
 }  // namespace limn::session

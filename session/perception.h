@@ -16,15 +16,12 @@
 #include "tracker/balls/constellation_filter.h"
 #include "tracker/body_filter.h"
 #include "tracker/cameras/camera_detector.h"
+#include "tracker/cameras/control_uses.h"
 #include "tracker/feeds/foreign_tracker.h"
 
 namespace limn::session {
 
-/// A use of a control of the scene. `control` is its index; `steps` is -1 for a turn backwards.
-struct ControlUse {
-  std::size_t control = 0;
-  int steps = 1;
-};
+using tracker::ControlUse;
 
 /// A marker may be paired after it has been still for this long; seconds.
 inline constexpr double k_lies_after_s = 1;
@@ -108,11 +105,6 @@ class Perception {
   const Percepts& percepts() const { return percepts_; }
 
  private:
-  struct Camera {
-    tracker::CameraDetector detector;               // for images that come to this machine
-    std::uint64_t counted_by = 0;                   // CameraDetections::run of the newest
-    std::vector<tracker::GestureReading> controls;  // in the newest detections, one per control
-  };
   struct Loose {
     MarkerName marker;
     int moments = 0;  // number of moments in which it was seen
@@ -129,7 +121,6 @@ class Perception {
   void note_loose(std::span<const std::size_t> cameras);
   void follow_loose();
   void follow_feeds(bool has_frames, const FeedInput& input);
-  void read_gestures(std::size_t camera, const tracker::CameraDetections& found);
 
   Rig rig_;
   PerceptionOptions options_;
@@ -138,8 +129,8 @@ class Perception {
   double loose_size_m_ = 0;
   std::vector<MarkerName> used_;  // markers of bodies and controls
   std::vector<Loose> loose_;
-  std::vector<Camera> cameras_;            // one per camera
-  std::vector<Stamp> used_at_;             // one per control
+  std::vector<tracker::CameraDetector> detectors_;  // one per camera
+  std::optional<tracker::ControlUses> uses_;
   std::vector<tracker::BodyFilter> seen_;  // motions by the cameras alone
   std::vector<tracker::ForeignTracker> feeds_;
   Percepts percepts_;

@@ -18,6 +18,7 @@
 #include "nodes/node_frames.h"
 #include "nodes/remote_devices.h"
 #include "nodes/room_host.h"
+#include "session/camera_threads.h"
 #include "session/frame_composer.h"
 #include "sim/virtual_rig.h"
 #include "tests/nodes/memory_room.h"
@@ -93,9 +94,10 @@ class NodeTest : public ::testing::Test {
     setup_.scene = *world_.scene;
   }
 
-  void open_host() {
+  void open_host(const std::vector<device::CameraConfig>& cameras = {}) {
     const Imager& projector = setup_.rig.projectors[1];
     device::Devices devices;
+    devices.cameras = cameras;
     devices.displays = {offscreen(projector.name, "left", {projector.width, projector.height})};
     host_ = std::make_unique<Room>(std::make_unique<test::MemoryLink>(&room_, "host"));
     client_ = RoomHost::open(host_.get(), &files_, devices, folder_ / "host", AppendLog(), &setup_).value();
@@ -177,6 +179,57 @@ TEST_F(NodeTest, ShowsTheHostsImagesAndIsBackAfterARestart) {
     const auto shown = shown_in(folder_ / run);
     EXPECT_GT(shown.size(), 5u);
     for (const auto& [frame, hash] : shown) EXPECT_EQ(hash, wanted.at(frame)) << "frame " << frame;
+  }
+}
+
+// The node sends what its camera shows; the host's poses are those of the same images searched here.
+TEST_F(NodeTest, DetectsBesideItsCamera) {
+  fs::create_directories(folder_ / "images");
+  const int first = 0;
+  const Frame image = rig_.expose(std::span(&first, 1))[0];
+  ASSERT_TRUE(write_png(folder_ / "image.png", image.image).ok());
+  for (int i = 0; i < 900; ++i)
+    fs::create_symlink(folder_ / "image.png", folder_ / fmt::format("images/{:03}.png", i));
+  device::CameraConfig config{.name = "camera0", .host = "left", .source = (folder_ / "images").string()};
+  config.size = image.image.size();
+  open_host({config});
+  RoomOpener opener(host_.get(), nullptr);
+  auto camera = opener.camera(config);
+  ASSERT_TRUE(camera) << camera.message();
+  const auto health = std::make_shared<session::DeviceHealth>();
+  session::CameraThreads threads(health);
+  threads.add(std::move(*camera), health->add({"camera0", "camera"}));
+  const Stamp begun = now();
+  RunningNode node(&room_, "left", folder_ / "node");
+
+  session::Perception here = session::Perception::create(setup_.scene, setup_.rig).value();
+  Frame same = image;
+  std::size_t detections = 0, images = 0;
+  while (detections < 30 || images < 2) {
+    ASSERT_LT(seconds_between(begun, now()), 30) << detections << " detections, " << images << " images";
+    const auto output = threads.take_output(50ms);
+    if (!output) continue;
+    EXPECT_TRUE(output->frames.empty());
+    for (const auto& [name, got] : output->images) {
+      EXPECT_EQ(cv::norm(got.image, image.image, cv::NORM_INF), 0);
+      ++images;
+    }
+    for (const auto& [name, found] : output->detections) {
+      ++detections;
+      EXPECT_LT(seconds_between(found.captured_at, now()), 1);
+      perception_->watch({}, {.detections = {found}});
+      same.captured_at = found.captured_at;
+      here.watch(std::span(&same, 1));
+    }
+  }
+  EXPECT_LT(images, detections / 2);  // at most five a second
+  const std::vector<Track>&there = perception_->percepts().tracks, &wanted = here.percepts().tracks;
+  ASSERT_EQ(there.size(), wanted.size());
+  ASSERT_FALSE(wanted.empty());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    EXPECT_EQ(there[i].body, wanted[i].body);
+    EXPECT_LT((there[i].world_from_body.translation - wanted[i].world_from_body.translation).norm(), 1e-4);
+    EXPECT_LT(angle_between(there[i].world_from_body.rotation, wanted[i].world_from_body.rotation), 1e-3);
   }
 }
 

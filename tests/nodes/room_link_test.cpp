@@ -79,7 +79,7 @@ TEST(RoomLink, DeliversEveryMessageToTheBit) {
   const auto host = room.open_link("alpha", RoomRole::host);
   const Peer peer(room.folder(), "beta", "node", "replies", k_seed);
   ASSERT_TRUE(wait_for<Offer>(*host, "beta"));
-  for (const std::size_t kind : {0u, 3u, 4u, 6u, 7u}) {  // those that a node may send
+  for (const std::size_t kind : {0u, 3u, 4u, 6u, 7u, 8u}) {  // those that a node may send
     for (std::uint64_t i = 0; i < 20; ++i) {
       const auto got = requested(*host, kind, i);
       ASSERT_TRUE(got) << "kind " << kind;
