@@ -251,7 +251,7 @@ Order WireReading::message(const limn_v1_Order& in) {
   Order out;
   out.to = text(in.to);
   out.number = in.number;
-  out.what = enumerator(in.what, Order::What::grab, "what");
+  out.what = enumerator(in.what, Order::What::preview, "what");
   out.device = text(in.device);
   out.image = bytes(in.image);
   out.at = stamp(in.at);

@@ -92,7 +92,8 @@ struct Order {
     open_display,
     show,  ///< shows `image`
     open_camera,
-    grab  ///< answers the next image; with `at`, one that was exposed later
+    grab,    ///< answers the next image; with `at`, one that was exposed later
+    preview  ///< likewise, as a JPEG that need not be exact
   };
   std::string to = {};
   std::uint64_t number = 0;
@@ -107,7 +108,7 @@ struct Answer {
   std::uint64_t number = 0;
   std::string error = {};  ///< empty: it was done
   cv::Size size = {};
-  std::string image = {};  ///< PNG, or a JPEG as the camera sent it
+  std::string image = {};  ///< PNG, a JPEG as the camera sent it, or one made for a preview
   Stamp at = {};           ///< when it was shown or exposed, on the host's clock
 };
 

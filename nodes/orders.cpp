@@ -10,6 +10,7 @@ namespace limn::nodes {
 namespace {
 
 constexpr double k_open_limit_s = 8;
+constexpr int k_preview_quality = 90;
 constexpr double k_same_s = 1e-3;     // stamps of one image, converted there and back, differ by less
 constexpr double k_grab_limit_s = 4;  // for an image that was exposed after a given moment
 
@@ -54,17 +55,19 @@ Status open_camera(const Order& order, NodeCameras* devices, Answer* answer) {
   return {};
 }
 
-Status put(const Frame& frame, const ClockEstimate& clock, Answer* answer) {
+Status put(const Frame& frame, bool is_preview, const ClockEstimate& clock, Answer* answer) {
   answer->at = clock.to_other(frame.captured_at);
   answer->size = frame.image.size();
   if (frame.jpeg) {
     answer->image = *frame.jpeg;
     return {};
   }
-  std::vector<std::uint8_t> png;
-  if (!cv::imencode(".png", frame.image, png, {cv::IMWRITE_PNG_COMPRESSION, 1}))
-    return error("{}: the image could not be encoded.", frame.camera);
-  answer->image.assign(png.begin(), png.end());
+  std::vector<std::uint8_t> bytes;
+  const bool is_encoded =
+      is_preview ? cv::imencode(".jpg", frame.image, bytes, {cv::IMWRITE_JPEG_QUALITY, k_preview_quality})
+                 : cv::imencode(".png", frame.image, bytes, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  if (!is_encoded) return error("{}: the image could not be encoded.", frame.camera);
+  answer->image.assign(bytes.begin(), bytes.end());
   return {};
 }
 
@@ -74,10 +77,14 @@ Status grab(const Order& order, const ClockEstimate& clock, NodeCameras* devices
   while (seconds_between(begun, now()) < k_grab_limit_s) {
     LIMN_TRY(const Frame frame, camera->next());
     if (order.at != Stamp() && frame.captured_at <= after) continue;
-    return put(frame, clock, answer);
+    return put(frame, order.what == Order::What::preview, clock, answer);
   }
   return error("{}: expected an image that was exposed after the order within {} s, found none.",
                camera->name(), k_grab_limit_s);
+}
+
+bool asks_for_image(const Order& order) {
+  return order.what == Order::What::grab || order.what == Order::What::preview;
 }
 
 Error no_clock() {
@@ -97,7 +104,7 @@ Answer answer_to(const Order& order, const std::function<Status(Answer*)>& carry
 
 bool is_for_camera(const Order& order) {
   using enum Order::What;
-  return order.what == open_camera || order.what == grab;
+  return order.what == open_camera || asks_for_image(order);
 }
 
 Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeDisplays* displays) {
@@ -112,8 +119,7 @@ Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock
 Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, NodeCameras* cameras) {
   return answer_to(order, [&](Answer* answer) -> Status {
     if (order.what == Order::What::open_camera) return open_camera(order, cameras, answer);
-    if (order.what == Order::What::grab)
-      return clock ? grab(order, *clock, cameras, answer) : Status(no_clock());
+    if (asks_for_image(order)) return clock ? grab(order, *clock, cameras, answer) : Status(no_clock());
     return unknown(order);
   });
 }
@@ -124,11 +130,11 @@ Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock
       LIMN_TRY(answer->size, camera->size(k_open_limit_s));
       return {};
     }
-    if (order.what != Order::What::grab) return unknown(order);
+    if (!asks_for_image(order)) return unknown(order);
     if (!clock) return no_clock();
     const Stamp after = order.at == Stamp() ? Stamp() : shifted(clock->to_local(order.at), k_same_s);
     LIMN_TRY(const Frame frame, camera->next_frame(after, k_grab_limit_s));
-    return put(frame, *clock, answer);
+    return put(frame, order.what == Order::What::preview, *clock, answer);
   });
 }
 

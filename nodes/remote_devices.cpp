@@ -17,7 +17,8 @@ constexpr double k_open_limit_s = 10, k_show_limit_s = 2, k_image_limit_s = 5;
 constexpr double k_most_lead_s = 0.1;
 constexpr auto k_detections_wait = std::chrono::milliseconds(10),
                k_image_pause = std::chrono::milliseconds(10);
-constexpr double k_image_every_s = 0.2;  // for drift, shadows and the operator's window
+constexpr double k_output_wait_s = 0.1,
+                 k_image_every_s = 0.2;  // for drift, shadows and the operator's window
 // Detections that are older or come from the future are of a node whose clock is wrong.
 constexpr double k_most_age_s = 2, k_ahead_s = 0.1;
 constexpr double k_network_s = 0.004;  // from a description's sending to the node's drawing, for most frames
@@ -86,8 +87,10 @@ Order RemoteCamera::order(Order::What what) const {
   return {.to = config_.host, .what = what, .device = device::devices_text({&config_, 1}, {})};
 }
 
-Result<Frame> RemoteCamera::next() {
-  Order order = this->order(Order::What::grab);
+Result<Frame> RemoteCamera::next() { return image_by(Order::What::grab); }
+
+Result<Frame> RemoteCamera::image_by(Order::What what) {
+  Order order = this->order(what);
   order.at = captured_at_;
   LIMN_TRY(Answer answer, room_->ask(std::move(order), k_image_limit_s));
   Frame frame;
@@ -134,15 +137,18 @@ std::optional<tracker::CameraDetections> RemoteCamera::accepted(Detections recei
 Result<tracker::DetectionSource::Output> RemoteCamera::next_output() {
   if (!asking_.joinable())
     asking_ = std::jthread([this](const std::stop_token& stop) { ask_for_images(stop); });
-  const Stamp end = shifted(now(), config_.limit_s);
+  const Stamp end = shifted(now(), k_output_wait_s);
   while (now() < end) {
     Output out;
     if (auto received = room_->take_detections(config_.host, config_.name, k_detections_wait))
       out.detections = accepted(std::move(*received));
+    if (out.detections) worked_at_ = now();
     const std::lock_guard lock(mutex_);
     out.image = std::exchange(image_, std::nullopt);
     if (out.detections || out.image) return out;
   }
+  if (seconds_between(worked_at_, now()) < config_.limit_s) return Output{};
+  worked_at_ = now();
   LIMN_TRY(const Machine node, node_of(*room_, config_.host, config_.name));
   if (!problem_.empty()) return error("{}", problem_);
   LIMN_TRY(const Answer answer, room_->ask(order(Order::What::open_camera), k_open_limit_s));  // it says why
@@ -156,7 +162,7 @@ void RemoteCamera::ask_for_images(const std::stop_token& stop) {
     while (!stop.stop_requested() &&
            (wants_every_image_ || seconds_between(asked_at, now()) >= k_image_every_s)) {
       asked_at = now();
-      auto image = next();
+      auto image = image_by(wants_every_image_ ? Order::What::grab : Order::What::preview);
       if (!image) break;
       const std::lock_guard lock(mutex_);
       image_ = std::move(*image);

