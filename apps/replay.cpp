@@ -140,7 +140,21 @@ class Recording final : public session::FrameClock, public session::FrameSource 
   }
 
   Status watch(const Json& event) {
-    const Json& list = event.at("watch");
+    LIMN_TRY(const std::vector<Frame> frames, frames_of(event.at("watch")));
+    session::FeedInput input = session::recorded_feeds(event);
+    for (const tracker::CameraDetections& found : input.detections)
+      if (!session_->setup().rig.find(found.camera))
+        return error("{}: expected detections of one of the rig's cameras, found {}.",
+                     options_.session.string(), found.camera);
+    if (event.contains("images")) {
+      LIMN_TRY(input.images, frames_of(event.at("images")));
+    }
+    perception_->watch(frames, input);
+    ++moments_;
+    return {};
+  }
+
+  Result<std::vector<Frame>> frames_of(const Json& list) const {
     std::vector<Frame> frames;
     for (const Json& item : list) {
       const std::string file = item.at("file"), camera = item.at("camera");
@@ -153,9 +167,7 @@ class Recording final : public session::FrameClock, public session::FrameSource 
       frame.captured_at = stamp_of(item.at("captured_at_ns"));
       frames.push_back(std::move(frame));
     }
-    perception_->watch(frames, session::recorded_feeds(event));
-    ++moments_;
-    return {};
+    return frames;
   }
 
   Status apply(const Json& event) {

@@ -13,7 +13,18 @@
 namespace limn::nodes {
 
 /// The topics of a room: one for each message that is sent, in the order of Message.
-enum class Topic { offer, setup, moment, screen_image, clock_request, clock_answer, order, answer, health };
+enum class Topic {
+  offer,
+  setup,
+  moment,
+  screen_image,
+  clock_request,
+  clock_answer,
+  order,
+  answer,
+  health,
+  detections
+};
 inline constexpr std::size_t k_topics = std::variant_size_v<Message> - 1;  // without Departure
 
 /// Whether each receiver gets the topic's samples through a writer of its own, so that a slow receiver delays

@@ -36,6 +36,7 @@ class WireReading {
   Order message(const limn_v1_Order& in);
   Answer message(const limn_v1_Answer& in);
   Health message(const limn_v1_Health& in);
+  Detections message(const limn_v1_Detections& in);
 
  private:
   void refuse(Error problem) {
@@ -72,6 +73,8 @@ class WireReading {
   static scene::PosedPart part(const limn_v1_PosedPart& in);
   static scene::RoomLight light(const limn_v1_RoomLight& in);
   static scene::PosedScene posed(const limn_v1_PosedScene& in);
+  static tracker::Detection detection(const limn_v1_DetectedMarker& in);
+  static tracker::Ball ball(const limn_v1_DetectedBall& in);
   static OfferedDevice device(const limn_v1_OfferedDevice& in) { return {text(in.name), size(in.size)}; }
   Track track(const limn_v1_Track& in);
   Imager imager(const limn_v1_Imager& in);
@@ -253,7 +256,7 @@ Order WireReading::message(const limn_v1_Order& in) {
   Order out;
   out.to = text(in.to);
   out.number = in.number;
-  out.what = enumerator(in.what, Order::What::grab, "what");
+  out.what = enumerator(in.what, Order::What::preview, "what");
   out.device = text(in.device);
   out.image = bytes(in.image);
   out.at = stamp(in.at);
@@ -286,6 +289,46 @@ Health WireReading::message(const limn_v1_Health& in) {
     return Refresh{stamp(item.at), item.period_s};
   });
   out.screen_problems = list(in.screen_problems, &WireReading::text);
+  return out;
+}
+
+tracker::Detection WireReading::detection(const limn_v1_DetectedMarker& in) {
+  tracker::Detection out;
+  out.marker = marker(in.marker);
+  for (std::size_t i = 0; i < 4; ++i) {
+    out.corners_px[i] = Eigen::Vector2d(in.corners[i].px);
+    out.corner_covariance[i] = Eigen::Matrix2d(in.corners[i].covariance);
+    out.corner_visible[i] = in.corners[i].is_visible;
+  }
+  out.score = in.score;
+  return out;
+}
+
+tracker::Ball WireReading::ball(const limn_v1_DetectedBall& in) {
+  tracker::Ball out;
+  out.d_centre = vector(in.d_centre);
+  out.half_angle = in.half_angle;
+  out.centre_px = Eigen::Vector2d(in.centre_px);
+  out.centre_covariance = Eigen::Matrix2d(in.covariance);
+  out.radius_px = in.radius_px;
+  out.half_angle_stddev = in.half_angle_stddev;
+  out.contrast = in.contrast;
+  out.blur_px = in.blur_px;
+  return out;
+}
+
+Detections WireReading::message(const limn_v1_Detections& in) {
+  Detections out;
+  out.setup = in.setup;
+  out.found.camera = text(in.camera);
+  out.found.captured_at = stamp(in.captured_at);
+  out.found.run = in.counted_by;
+  out.found.detections = list(in.markers, &WireReading::detection);
+  out.found.balls = list(in.balls, &WireReading::ball);
+  out.found.controls = list(in.controls, [](const limn_v1_Gestures& item) {
+    return tracker::GestureReading{item.forward, item.backward, item.is_seen,
+                                   optional(item.hidden_since, &WireReading::stamp)};
+  });
   return out;
 }
 
@@ -322,6 +365,8 @@ Result<Received> from_wire(Topic topic, const void* sample, Stamp arrived_at) {
       return received<limn_v1_Answer>(sample, arrived_at);
     case Topic::health:
       return received<limn_v1_Health>(sample, arrived_at);
+    case Topic::detections:
+      return received<limn_v1_Detections>(sample, arrived_at);
   }
   return error("topic: expected a known one, found {}.", static_cast<int>(topic));
 }

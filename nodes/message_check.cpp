@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <numbers>
 
 #include "nodes/packed_image.h"
 
@@ -14,6 +15,8 @@ constexpr std::size_t k_most_items = 4096;
 constexpr std::size_t k_longest_name = 1024, k_longest_text = 64 << 10, k_longest_options = 4 << 20;
 constexpr std::size_t k_most_image_bytes = 64 << 20;
 constexpr std::size_t k_node_name = 64;
+constexpr std::size_t k_most_found = 1024;  // markers, balls or controls of one camera
+constexpr double k_most_px = 2 * k_max_side;
 
 // Keeps the first problem, so that callers need no check after each value.
 class MessageCheck {
@@ -54,6 +57,20 @@ class MessageCheck {
     require(image.dims == 2 && image.depth() == CV_8U && (image.channels() == channels || channels == 0) &&
                 pixels_ <= k_most_packed_pixels,
             field, "8-bit images of at most 4 million pixels in all");
+  }
+  void pixel(const char* field, const Eigen::Vector2d& px) {
+    require(px.allFinite() && px.cwiseAbs().maxCoeff() <= k_most_px, field, "pixels near an image");
+  }
+  void covariance(const char* field, const Eigen::Matrix2d& values) {
+    constexpr double k_tolerance = 1e-9;  // for symmetry; rounding leaves 1e-15
+    const bool is_symmetric =
+        values.allFinite() && std::abs(values(0, 1) - values(1, 0)) <= k_tolerance * values.trace();
+    require(
+        is_symmetric && values(0, 0) > 0 && values.determinant() > 0 && std::isfinite(values.determinant()),
+        field, "a symmetric positive definite covariance");
+  }
+  void count_of_uses(const char* field, int uses) {
+    require(uses >= 0 && uses <= (1 << 30) - 1, field, "a number of uses from 0 to 2^30 - 1");
   }
   Status status() const { return status_; }
 
@@ -245,6 +262,42 @@ void check(const Health& health, MessageCheck* to) {
   to->count("screen_problems", health.screen_problems);
   for (const std::string& problem : health.screen_problems)
     to->text("screen_problems", problem, k_longest_text);
+}
+
+void check(const tracker::Detection& marker, MessageCheck* to) {
+  to->text("marker.name", marker.marker.family);
+  to->text("marker.name", marker.marker.id);
+  to->require(marker.score >= 0 && marker.score <= 1, "marker.score", "a probability");
+  for (std::size_t i = 0; i < 4; ++i) {
+    to->pixel("marker.corners", marker.corners_px[i]);
+    to->covariance("marker.covariance", marker.corner_covariance[i]);
+  }
+}
+
+void check(const tracker::Ball& ball, MessageCheck* to) {
+  constexpr double k_tolerance = 1e-6;  // for a unit vector's norm
+  to->require(std::abs(ball.d_centre.norm() - 1) < k_tolerance, "ball.d_centre", "a unit vector");
+  to->require(ball.half_angle > 0 && ball.half_angle < std::numbers::pi / 2, "ball.half_angle",
+              "an angle between 0 and 90 degrees");
+  to->pixel("ball.centre_px", ball.centre_px);
+  to->covariance("ball.covariance", ball.centre_covariance);
+  to->finite("ball", {ball.contrast, ball.blur_px});
+  to->require(ball.radius_px > 0 && ball.radius_px <= k_most_px, "ball.radius_px", "a radius in an image");
+  to->require(ball.half_angle_stddev > 0 && std::isfinite(ball.half_angle_stddev), "ball.half_angle_stddev",
+              "a standard deviation");
+}
+
+void check(const Detections& message, MessageCheck* to) {
+  to->text("camera", message.found.camera);
+  to->count("markers", message.found.detections, k_most_found);
+  to->count("balls", message.found.balls, k_most_found);
+  to->count("controls", message.found.controls, k_most_found);
+  for (const tracker::Detection& marker : message.found.detections) check(marker, to);
+  for (const tracker::Ball& ball : message.found.balls) check(ball, to);
+  for (const tracker::GestureReading& control : message.found.controls) {
+    to->count_of_uses("controls.forward", control.forward);
+    to->count_of_uses("controls.backward", control.backward);
+  }
 }
 
 void check(const Departure& /*departure*/, MessageCheck* to) {

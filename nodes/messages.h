@@ -9,6 +9,7 @@
 
 #include "core/frame.h"
 #include "session/drawing/frame_description.h"
+#include "tracker/cameras/camera_detections.h"
 
 namespace limn::nodes {
 
@@ -99,7 +100,8 @@ struct Order {
     open_display,
     show,  ///< shows `image`
     open_camera,
-    grab  ///< answers the next image; with `at`, one that was exposed later
+    grab,    ///< answers the next image; with `at`, one that was exposed later
+    preview  ///< likewise, as a JPEG that need not be exact
   };
   std::string to = {};
   std::uint64_t number = 0;
@@ -114,7 +116,7 @@ struct Answer {
   std::uint64_t number = 0;
   std::string error = {};  ///< empty: it was done
   cv::Size size = {};
-  std::string image = {};  ///< PNG, or a JPEG as the camera sent it
+  std::string image = {};  ///< PNG, a JPEG as the camera sent it, or one made for a preview
   Stamp at = {};           ///< when it was shown or exposed, on the host's clock
 };
 
@@ -142,10 +144,25 @@ struct Health {
   std::vector<std::string> screen_problems = {};
 };
 
+/// What an image of a node's camera shows. Best effort; the newest of each camera wins.
+struct Detections {
+  std::uint64_t setup = 0;          ///< the Setup::revision whose markers and lens were used
+  tracker::CameraDetections found;  ///< stamps of the host's clock
+};
+
 /// The sender has gone: it said so, or was not heard for as long as its liveliness lasts. Made by the link.
 struct Departure {};
 
-using Message = std::
-    variant<Offer, Setup, Moment, ScreenImage, ClockRequest, ClockAnswer, Order, Answer, Health, Departure>;
+using Message = std::variant<Offer,
+                             Setup,
+                             Moment,
+                             ScreenImage,
+                             ClockRequest,
+                             ClockAnswer,
+                             Order,
+                             Answer,
+                             Health,
+                             Detections,
+                             Departure>;
 
 }  // namespace limn::nodes

@@ -12,6 +12,7 @@
 
 #include "core/file.h"
 #include "core/log.h"
+#include "core/names.h"
 #include "core/stopwatch.h"
 #include "core/version.h"
 #include "device/gl_context.h"
@@ -19,6 +20,7 @@
 #include "nodes/node_frames.h"
 #include "nodes/node_screens.h"
 #include "nodes/orders.h"
+#include "tracker/camera_encoding.h"
 
 namespace limn::nodes {
 namespace {
@@ -131,6 +133,7 @@ class NodeLoop {
     if (loaded && host_ && loaded->run != host_->sender.run) return;  // its host has gone
     drawn_.reset();
     const std::string problem_before = std::exchange(problem_, {});
+    if (loaded) detect(*loaded);
     frames_.reset();
     if (loaded) screens_.set_devices(loaded->devices, loaded->session.rig, room_->self().node);
     auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)
@@ -145,6 +148,21 @@ class NodeLoop {
     problem_ = frames.message();
     if (problem_ == problem_before) return;
     log_warning("node: {}", problem_);
+  }
+
+  // In the images of the session's cameras that are plugged in here.
+  void detect(const LoadedSetup& loaded) {
+    const session::SessionSetup& session = loaded.session;
+    const auto wanted = session::camera_detector_setup(session.scene, session.watch.full_scan_every);
+    if (!wanted) return log_warning("node: {}", wanted.message());
+    std::vector<CameraTask> tasks;
+    for (const device::CameraConfig& config : loaded.devices.cameras) {
+      const Imager* camera = find_named(session.rig.cameras, config.name);
+      if (config.host == room_->self().node && camera)
+        tasks.push_back(
+            {config, {loaded.revision, *wanted, *camera, tracker::encoding_of(session.rig, *camera)}});
+    }
+    cameras_.detect(std::move(tasks));
   }
 
   // Orders that come before the clocks are compared wait for that.

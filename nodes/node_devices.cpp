@@ -50,4 +50,9 @@ Result<device::CameraSource*> NodeCameras::camera(const device::CameraConfig& co
   return camera.get();
 }
 
+std::unique_ptr<device::CameraSource> NodeCameras::taken_out(const std::string& config) {
+  auto camera = cameras_.extract(config);
+  return camera ? std::move(camera.mapped()) : nullptr;
+}
+
 }  // namespace limn::nodes

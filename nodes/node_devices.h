@@ -41,6 +41,8 @@ class NodeCameras {
 
   /// The camera of that configuration. Errors are those of open_camera_here().
   Result<device::CameraSource*> camera(const device::CameraConfig& config);
+  /// The camera of that configuration if it is open; it is not kept here any more.
+  std::unique_ptr<device::CameraSource> taken_out(const std::string& config);
   void close_all() { cameras_.clear(); }
 
  private:

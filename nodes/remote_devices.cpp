@@ -1,6 +1,7 @@
 #include "nodes/remote_devices.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include "core/image_encoder.h"
 #include "core/image_formats.h"
@@ -16,6 +17,12 @@ namespace {
 
 constexpr double k_open_limit_s = 10, k_show_limit_s = 2, k_image_limit_s = 5;
 constexpr double k_most_lead_s = 0.1;
+constexpr auto k_detections_wait = std::chrono::milliseconds(10),
+               k_image_pause = std::chrono::milliseconds(10);
+constexpr double k_output_wait_s = 0.1,
+                 k_image_every_s = 0.2;  // for drift, shadows and the operator's window
+// Detections that are older or come from the future are of a node whose clock is wrong.
+constexpr double k_most_age_s = 2, k_ahead_s = 0.1;
 constexpr double k_network_s = 0.004;  // from a description's sending to the node's drawing, for most frames
 
 }  // namespace
@@ -78,8 +85,10 @@ Order RemoteCamera::order(Order::What what) const {
   return {.to = config_.host, .what = what, .device = device::devices_text({&config_, 1}, {})};
 }
 
-Result<Frame> RemoteCamera::next() {
-  Order order = this->order(Order::What::grab);
+Result<Frame> RemoteCamera::next() { return image_by(Order::What::grab); }
+
+Result<Frame> RemoteCamera::image_by(Order::What what) {
+  Order order = this->order(what);
   order.at = captured_at_;
   LIMN_TRY(Answer answer, room_->ask(std::move(order), k_image_limit_s));
   Frame frame;
@@ -96,6 +105,67 @@ Result<Frame> RemoteCamera::next() {
   frame.camera = config_.name;
   frame.captured_at = captured_at_ = answer.at;
   return frame;
+}
+
+RemoteCamera::~RemoteCamera() = default;
+
+// What can be used: of this time, inside the image, and gestures only of the scene that the session shows.
+std::optional<tracker::CameraDetections> RemoteCamera::accepted(Detections received) {
+  tracker::CameraDetections& found = received.found;
+  const auto count = [](Stamp at) { return 1e-9 * static_cast<double>(at.time_since_epoch().count()); };
+  const double age_s = count(now()) - count(found.captured_at);
+  problem_.clear();
+  if (age_s < -k_ahead_s || age_s > k_most_age_s)
+    problem_ =
+        fmt::format("{}: expected detections of now, found ones of {:.1f} s ago.", config_.name, age_s);
+  if (found.captured_at <= detected_at_ || !problem_.empty()) return std::nullopt;
+  detected_at_ = found.captured_at;
+  if (received.setup != room_->sent_setup()) found.controls.clear();
+  const auto is_outside = [&](const Eigen::Vector2d& px) {
+    return px.x() < -size_.width || px.y() < -size_.height || px.x() > 2 * size_.width ||
+           px.y() > 2 * size_.height;
+  };
+  std::erase_if(found.detections, [&](const tracker::Detection& marker) {
+    return std::ranges::any_of(marker.corners_px, is_outside);
+  });
+  std::erase_if(found.balls, [&](const tracker::Ball& ball) { return is_outside(ball.centre_px); });
+  return std::move(found);
+}
+
+Result<tracker::DetectionSource::Output> RemoteCamera::next_output() {
+  if (!asking_.joinable())
+    asking_ = std::jthread([this](const std::stop_token& stop) { ask_for_images(stop); });
+  const Stamp end = shifted(now(), k_output_wait_s);
+  while (now() < end) {
+    Output out;
+    if (auto received = room_->take_detections(config_.host, config_.name, k_detections_wait))
+      out.detections = accepted(std::move(*received));
+    if (out.detections) worked_at_ = now();
+    const std::lock_guard lock(mutex_);
+    out.image = std::exchange(image_, std::nullopt);
+    if (out.detections || out.image) return out;
+  }
+  if (seconds_between(worked_at_, now()) < config_.limit_s) return Output{};
+  worked_at_ = now();
+  LIMN_TRY(const Machine node, node_of(*room_, config_.host, config_.name));
+  if (!problem_.empty()) return error("{}", problem_);
+  LIMN_TRY(const Answer answer, room_->ask(order(Order::What::open_camera), k_open_limit_s));  // it says why
+  return error("{}: expected detections from {} within {:g} s, found none.", config_.name, node.sender.node,
+               config_.limit_s);
+}
+
+void RemoteCamera::ask_for_images(const std::stop_token& stop) {
+  Stamp asked_at;
+  for (; !stop.stop_requested(); std::this_thread::sleep_for(k_image_pause)) {
+    while (!stop.stop_requested() &&
+           (wants_every_image_ || seconds_between(asked_at, now()) >= k_image_every_s)) {
+      asked_at = now();
+      auto image = image_by(wants_every_image_ ? Order::What::grab : Order::What::preview);
+      if (!image) break;
+      const std::lock_guard lock(mutex_);
+      image_ = std::move(*image);
+    }
+  }
 }
 
 Result<std::unique_ptr<device::Display>> RoomOpener::display(const device::DisplayConfig& config) {

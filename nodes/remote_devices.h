@@ -1,13 +1,17 @@
 #pragma once
 
+#include <atomic>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "device/device_opener.h"
 #include "nodes/room.h"
+#include "tracker/cameras/detection_source.h"
 
 namespace limn::nodes {
 
@@ -42,25 +46,38 @@ class RemoteDisplay final : public device::Display {
   cv::Size size_;
 };
 
-/// A camera that is plugged into a node. Each image is asked for.
-class RemoteCamera final : public device::CameraSource {
+/// A camera that is plugged into a node. Each image is asked for. In a session the node detects, and a few
+/// images a second are asked for on a thread of their own.
+class RemoteCamera final : public device::CameraSource, public tracker::DetectionSource {
  public:
   /// A camera of the node `config.host`, opened as a RemoteDisplay is.
   static Result<std::unique_ptr<RemoteCamera>> open(Room* room, const device::CameraConfig& config);
+  ~RemoteCamera() override;
 
   const std::string& name() const override { return config_.name; }
   cv::Size size() const override { return size_; }
   Result<Frame> next() override;
   std::string description() const override { return "at " + config_.host; }
+  Result<Output> next_output() override;
+  void want_every_image(bool is_wanted) override { wants_every_image_ = is_wanted; }
 
  private:
   RemoteCamera(Room* room, const device::CameraConfig& config) : room_(room), config_(config) {}
   Order order(Order::What what) const;
+  Result<Frame> image_by(Order::What what);
+  std::optional<tracker::CameraDetections> accepted(Detections received);
+  void ask_for_images(const std::stop_token& stop);
 
   Room* room_;
   device::CameraConfig config_;
   cv::Size size_;
-  Stamp captured_at_;
+  Stamp captured_at_, detected_at_;
+  Stamp worked_at_ = now();  // when the last detections came, or an error was returned
+  std::string problem_;      // with the last detections
+  std::atomic<bool> wants_every_image_ = false;
+  std::mutex mutex_;
+  std::optional<Frame> image_;  // that was not taken
+  std::jthread asking_;
 };
 
 /// Opens devices at the machine that their configuration names: a node of the room, or this one. Cameras

@@ -8,6 +8,7 @@
 namespace limn::nodes {
 namespace {
 
+constexpr std::size_t k_most_cameras = 1024;  // whose detections are kept
 constexpr auto k_receive_wait = std::chrono::milliseconds(20);
 
 }  // namespace
@@ -25,6 +26,11 @@ Status Room::offer(const Offer& offer) {
     is_host_ = offer.is_host;
   }
   return link_->send(offer);
+}
+
+Status Room::send(const Message& message) {
+  if (const auto* setup = std::get_if<Setup>(&message)) sent_setup_ = setup->revision;
+  return link_->send(message);
 }
 
 void Room::run() {
@@ -87,6 +93,11 @@ void Room::note(Received received) {
   } else if (auto* health = std::get_if<Health>(&received.message)) {
     if (is_known) machine->second.health = std::move(*health);
     return;
+  } else if (auto* seen = std::get_if<Detections>(&received.message)) {
+    if (!is_known ||
+        (detections_.size() >= k_most_cameras && !detections_.contains({from.node, seen->found.camera})))
+      return;
+    detections_[{from.node, seen->found.camera}] = std::move(*seen);
   }
   has_arrived_ = true;
   changed_.notify_all();
@@ -114,6 +125,7 @@ void Room::note_departure(const Sender& from) {
     waiting_orders_.clear();
   }
   machines_.erase(machine);
+  std::erase_if(detections_, [&](const auto& entry) { return entry.first.first == from.node; });
 }
 
 std::vector<Machine> Room::machines() const {
@@ -199,6 +211,15 @@ Result<Answer> Room::ask(Order order, double limit_s) {
   if (!answer) return error("{}: expected an answer within {:.1f} s, found none.", node, limit_s);
   if (!answer->error.empty()) return error("{}: {}", node, answer->error);
   return *answer;
+}
+
+std::optional<Detections> Room::take_detections(const std::string& node,
+                                                const std::string& camera,
+                                                std::chrono::nanoseconds limit) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, limit, [&] { return detections_.contains({node, camera}); });
+  auto taken = detections_.extract({node, camera});
+  return taken ? std::optional(std::move(taken.mapped())) : std::nullopt;
 }
 
 }  // namespace limn::nodes

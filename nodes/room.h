@@ -39,7 +39,9 @@ class Room {
   const Sender& self() const { return link_->self(); }
   /// Says what this machine is and has. Error: the engine's message.
   Status offer(const Offer& offer);
-  Status send(const Message& message) { return link_->send(message); }
+  Status send(const Message& message);
+  /// Setup::revision of the setup that this machine has sent last.
+  std::uint64_t sent_setup() const { return sent_setup_; }
 
   /// The link's warnings of the last 10 seconds (RoomLink::problems).
   std::vector<std::string> problems() const { return link_->problems(); }
@@ -70,6 +72,10 @@ class Room {
   /// For the host: sends an order and waits for its answer. Error: the node's message, no answer in time, or
   /// no such machine.
   Result<Answer> ask(Order order, double limit_s);
+  /// For the host: what a node's camera shows, the newest that was not taken; waits up to `limit` for it.
+  std::optional<Detections> take_detections(const std::string& node,
+                                            const std::string& camera,
+                                            std::chrono::nanoseconds limit);
 
  private:
   void run();
@@ -91,7 +97,9 @@ class Room {
   std::map<std::string, ScreenImage> screen_images_;  // by screen
   std::optional<std::pair<Setup, Sender>> setup_;
   std::vector<ReceivedOrder> waiting_orders_;
-  std::map<std::uint64_t, std::optional<Answer>> answers_;  // by order that somebody waits for
+  std::map<std::uint64_t, std::optional<Answer>> answers_;                // by order that somebody waits for
+  std::map<std::pair<std::string, std::string>, Detections> detections_;  // by node and camera
+  std::atomic<std::uint64_t> sent_setup_ = 0;
   bool has_arrived_ = false;
   std::atomic<bool> is_stopping_ = false;
   std::thread thread_;

@@ -70,7 +70,7 @@ std::string permissions_document(const RoomSubjects& subjects,
                                  std::time_t not_before,
                                  std::time_t not_after) {
   std::string of_nodes;
-  for (const char* topic : {"offer", "clock_request", "clock_answer", "answer", "health"})
+  for (const char* topic : {"offer", "clock_request", "clock_answer", "answer", "health", "detections"})
     of_nodes += fmt::format("<topic>limn_v1_{}</topic>", topic);
   return fmt::format(
       R"(<?xml version="1.0" encoding="utf-8"?>

@@ -37,12 +37,14 @@ const std::string* receiver_of(const Message& message) {
       message);
 }
 
-// What a best-effort message replaces: the one of the same kind and sender, and for the same screen.
+// What a best-effort message replaces: the one of the same kind and sender, and for the same screen or
+// camera.
 bool is_replaced(const Received& old, const Received& fresh) {
-  const auto* before = std::get_if<ScreenImage>(&old.message);
-  const auto* after = std::get_if<ScreenImage>(&fresh.message);
-  return old.message.index() == fresh.message.index() && old.from == fresh.from &&
-         (!before || !after || before->screen == after->screen);
+  if (old.message.index() != fresh.message.index() || old.from != fresh.from) return false;
+  if (const auto* before = std::get_if<ScreenImage>(&old.message))
+    return before->screen == std::get<ScreenImage>(fresh.message).screen;
+  const auto* before = std::get_if<Detections>(&old.message);
+  return !before || before->found.camera == std::get<Detections>(fresh.message).found.camera;
 }
 
 // Seconds on a clock that also counts while the machine sleeps.

@@ -51,7 +51,7 @@ class RoomLink {
   /// sent.
   virtual Status send(const Message& message) = 0;
   /// What has arrived since the last call; waits up to `wait` for something. Of best-effort messages only the
-  /// newest of each sender is kept. Own messages are not received.
+  /// newest of each sender (and camera) is kept. Own messages are not received.
   virtual std::vector<Received> take_messages(std::chrono::nanoseconds wait) = 0;
   virtual LinkCounts counts() const { return {}; }
   /// The engine's warnings of the last 10 seconds, as sentences for people: programs with other keys that

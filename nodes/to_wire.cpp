@@ -34,6 +34,8 @@ class WireFilling {
   static void pose(const Pose& in, limn_v1_Pose* out);
   static void bytes(const std::string& in, dds_sequence_octet* out);
   static void marker(const MarkerName& in, limn_v1_Marker* out);
+  static void marker(const tracker::Detection& in, limn_v1_DetectedMarker* out);
+  static void ball(const tracker::Ball& in, limn_v1_DetectedBall* out);
 
   template <class Sequence>
   auto* allocated(std::size_t count, Sequence* out);
@@ -64,6 +66,7 @@ class WireFilling {
   void message(const Order& in, limn_v1_Order* out);
   void message(const Answer& in, limn_v1_Answer* out);
   void message(const Health& in, limn_v1_Health* out);
+  void message(const Detections& in, limn_v1_Detections* out);
 
   std::list<std::shared_ptr<void>> memory_;
 };
@@ -238,7 +241,7 @@ void WireFilling::message(const Moment& in, limn_v1_Moment* out) {
   });
   list(frame.on_surface, &out->on_surface, put_overlay);
   list(frame.signs, &out->signs, put_overlay);
-  list(frame.loose, &out->loose, &WireFilling::marker);
+  list(frame.loose, &out->loose, [](const MarkerName& item, limn_v1_Marker* to) { marker(item, to); });
   out->is_black = frame.is_black;
   out->is_moving = frame.is_moving;
   list(frame.arriving, &out->arriving, [this](const cv::Mat& map, auto* to) { image(map, to); });
@@ -326,6 +329,45 @@ void WireFilling::message(const Health& in, limn_v1_Health* out) {
   list(in.screen_problems, &out->screen_problems, &WireFilling::text);
 }
 
+void WireFilling::marker(const tracker::Detection& in, limn_v1_DetectedMarker* out) {
+  marker(in.marker, &out->marker);
+  for (std::size_t i = 0; i < 4; ++i) {
+    limn_v1_Corner& corner = out->corners[i];
+    std::copy_n(in.corners_px[i].data(), 2, corner.px);
+    std::copy_n(in.corner_covariance[i].data(), 4, corner.covariance);
+    corner.is_visible = in.corner_visible[i];
+  }
+  out->score = in.score;
+}
+
+void WireFilling::ball(const tracker::Ball& in, limn_v1_DetectedBall* out) {
+  vector(in.d_centre, &out->d_centre);
+  out->half_angle = in.half_angle;
+  std::copy_n(in.centre_px.data(), 2, out->centre_px);
+  std::copy_n(in.centre_covariance.data(), 4, out->covariance);
+  out->radius_px = in.radius_px;
+  out->half_angle_stddev = in.half_angle_stddev;
+  out->contrast = in.contrast;
+  out->blur_px = in.blur_px;
+}
+
+void WireFilling::message(const Detections& in, limn_v1_Detections* out) {
+  text(in.found.camera, &out->camera);
+  out->setup = in.setup;
+  out->captured_at = nanoseconds_of(in.found.captured_at);
+  out->counted_by = in.found.run;
+  list(in.found.detections, &out->markers,
+       [](const tracker::Detection& item, limn_v1_DetectedMarker* to) { marker(item, to); });
+  list(in.found.balls, &out->balls, &WireFilling::ball);
+  list(in.found.controls, &out->controls, [this](const tracker::GestureReading& item, limn_v1_Gestures* to) {
+    to->forward = item.forward;
+    to->backward = item.backward;
+    to->is_seen = item.is_seen;
+    optional(item.hidden_since, &to->hidden_since,
+             [](Stamp at, std::int64_t* since) { *since = nanoseconds_of(at); });
+  });
+}
+
 template <class T>
 struct WireOf;
 template <>
@@ -346,6 +388,8 @@ template <>
 struct WireOf<Answer> : std::type_identity<limn_v1_Answer> {};
 template <>
 struct WireOf<Health> : std::type_identity<limn_v1_Health> {};
+template <>
+struct WireOf<Detections> : std::type_identity<limn_v1_Detections> {};
 
 void WireFilling::fill(const Message& in, const Sender& from, std::shared_ptr<const void>* out) {
   std::visit(

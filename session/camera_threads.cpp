@@ -14,8 +14,16 @@ constexpr auto k_retry = std::chrono::milliseconds(100);
 }  // namespace
 
 struct CameraThreads::Shared {
+  void put(CameraOutput output) {
+    newest.put(std::move(output), [this](const CameraOutput& old, CameraOutput& next) {
+      for (const auto& [name, one] : old.frames) missed += !next.frames.emplace(name, one).second;
+      for (const auto& [name, one] : old.detections) missed += !next.detections.emplace(name, one).second;
+      next.images.insert(old.images.begin(), old.images.end());
+    });
+  }
+
   std::shared_ptr<DeviceHealth> health;
-  Latest<Frames> frames;
+  Latest<CameraOutput> newest;
   std::atomic<bool> is_stopping = false;
   std::atomic<std::size_t> missed = 0;
 };
@@ -40,9 +48,10 @@ CameraThreads::~CameraThreads() {
 
 void CameraThreads::add(std::unique_ptr<device::CameraSource> camera, std::size_t number) {
   std::promise<void> ended;
-  Running running{camera->name(), {}, ended.get_future()};
+  std::shared_ptr<device::CameraSource> source = std::move(camera);
+  Running running{source->name(), source, {}, ended.get_future()};
   running.thread =
-      std::thread([camera = std::move(camera), number, shared = shared_, ended = std::move(ended)]() mutable {
+      std::thread([camera = std::move(source), number, shared = shared_, ended = std::move(ended)]() mutable {
         grab(camera.get(), number, shared.get());
         camera.reset();  // closing the camera may take long, too
         ended.set_value();
@@ -50,13 +59,21 @@ void CameraThreads::add(std::unique_ptr<device::CameraSource> camera, std::size_
   running_.push_back(std::move(running));
 }
 
-std::optional<Frames> CameraThreads::take_frames(std::chrono::nanoseconds wait) {
-  return shared_->frames.take_newest(wait);
+std::optional<CameraOutput> CameraThreads::take_output(std::chrono::nanoseconds wait) {
+  return shared_->newest.take_newest(wait);
+}
+
+void CameraThreads::want_every_image(const std::string& camera, bool is_wanted) {
+  for (const Running& running : running_)
+    if (const auto source = running.source.lock(); source && running.camera == camera)
+      if (auto* detects = dynamic_cast<tracker::DetectionSource*>(source.get()))
+        detects->want_every_image(is_wanted);
 }
 
 std::size_t CameraThreads::missed() { return shared_->missed.exchange(0); }
 
 void CameraThreads::grab(device::CameraSource* camera, std::size_t number, Shared* shared) try {
+  if (auto* source = dynamic_cast<tracker::DetectionSource*>(camera)) return receive(source, number, shared);
   FrameGate gate(camera->name(), camera->size(), number, shared->health.get());
   while (!shared->is_stopping) {
     Result<Frame> sent = camera->next();
@@ -65,15 +82,25 @@ void CameraThreads::grab(device::CameraSource* camera, std::size_t number, Share
     if (!is_there) std::this_thread::sleep_for(k_retry);
     if (!frame) continue;
     if (gate.is_of_other_clock()) std::this_thread::sleep_until(frame->captured_at);
-    Frames frames;
-    frames.emplace(frame->camera, std::move(*frame));
-    shared->frames.put(std::move(frames), [shared](const Frames& old, Frames& newest) {
-      for (const auto& [name, frame] : old) shared->missed += !newest.emplace(name, frame).second;
-    });
+    const std::string name = frame->camera;
+    shared->put({.frames = {{name, std::move(*frame)}}});
   }
 } catch (const std::exception& bug) {
   shared->health->note(
       fmt::format("{}: this is a bug in Limn, please report it: {}", camera->name(), bug.what()));
+}
+
+void CameraThreads::receive(tracker::DetectionSource* camera, std::size_t number, Shared* shared) {
+  while (!shared->is_stopping) {
+    const auto sent = camera->next_output();
+    if (!sent) shared->health->fails(number, sent.message());
+    if (!sent || (!sent->detections && !sent->image)) continue;
+    CameraOutput output;
+    if (sent->detections) output.detections.emplace(sent->detections->camera, *sent->detections);
+    if (sent->image) output.images.emplace(sent->image->camera, *sent->image);
+    if (sent->detections) shared->health->works(number);
+    shared->put(std::move(output));
+  }
 }
 
 }  // namespace limn::session

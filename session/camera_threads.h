@@ -12,11 +12,18 @@
 #include "core/frame.h"
 #include "device/camera_source.h"
 #include "session/device_health.h"
+#include "tracker/cameras/detection_source.h"
 
 namespace limn::session {
 
 /// Frames by the name of their camera.
 using Frames = std::map<std::string, Frame>;
+
+/// What cameras have sent: frames, and of tracker::DetectionSources detections and some images.
+struct CameraOutput {
+  Frames frames = {}, images = {};
+  std::map<std::string, tracker::CameraDetections> detections = {};
+};
 
 /// Runs one thread for each camera of a session. It reads the camera's frames and converts their stamps to
 /// the session's clock. Only the newest frame of each camera is kept until take(); older ones are dropped and
@@ -33,8 +40,10 @@ class CameraThreads {
   /// `number`: the camera's number in `health`.
   void add(std::unique_ptr<device::CameraSource> camera, std::size_t number);
 
-  /// The newest frames that were not taken yet; waits up to `wait` for one.
-  std::optional<Frames> take_frames(std::chrono::nanoseconds wait);
+  /// The newest output that was not taken yet; waits up to `wait` for some.
+  std::optional<CameraOutput> take_output(std::chrono::nanoseconds wait);
+  /// tracker::DetectionSource::want_every_image(), if the camera is one.
+  void want_every_image(const std::string& camera, bool is_wanted);
   /// Number of frames that were dropped since the last call.
   std::size_t missed();
 
@@ -42,10 +51,12 @@ class CameraThreads {
   struct Shared;
   struct Running {
     std::string camera;
+    std::weak_ptr<device::CameraSource> source;
     std::thread thread;
     std::future<void> ended;
   };
   static void grab(device::CameraSource* camera, std::size_t number, Shared* shared);
+  static void receive(tracker::DetectionSource* camera, std::size_t number, Shared* shared);
 
   std::shared_ptr<Shared> shared_;  // shared with abandoned threads
   std::vector<Running> running_;

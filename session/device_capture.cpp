@@ -52,8 +52,18 @@ wizard::WizardBackend DeviceCapture::backend(ImageWriter* writer) {
 
 void DeviceCapture::pause_perception(Session* session) {
   perception_->stop();
+  want_every_image(true);
   if (Perceived last = perception_->take_percepts({}); last.percepts)
     session->update_percepts(std::move(*last.percepts), last.moments);
+}
+
+void DeviceCapture::resume_perception() {
+  want_every_image(false);
+  perception_->start();
+}
+
+void DeviceCapture::want_every_image(bool is_wanted) {
+  for (const std::string& name : camera_names_) cameras_->want_every_image(name, is_wanted);
 }
 
 // Shows an image on one projector, and black on the others.
@@ -77,15 +87,17 @@ Status DeviceCapture::show_pattern(std::size_t projector, const cv::Mat& image) 
 Result<cv::Mat> DeviceCapture::grab(const std::string& camera) {
   const Stamp begun = now();
   for (;;) {
-    auto newest = cameras_->take_frames(k_grab_wait);
-    if (newest)
-      for (auto& [name, frame] : *newest) {
+    auto newest = cameras_->take_output(k_grab_wait);
+    if (newest) {
+      newest->frames.merge(newest->images);
+      for (auto& [name, frame] : newest->frames) {
         const auto [known, is_first] = grabbed_.try_emplace(name, Grabbed{{}, k_longest_exposure_s});
         if (!is_first)
           known->second.period_s = std::min(
               known->second.period_s, seconds_between(known->second.frame.captured_at, frame.captured_at));
         known->second.frame = std::move(frame);
       }
+    }
     const auto found = grabbed_.find(camera);
     if (found != grabbed_.end() &&
         found->second.frame.captured_at >= shifted(on_surface_at_, found->second.period_s / 2))

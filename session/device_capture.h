@@ -26,7 +26,7 @@ class DeviceCapture final : public CaptureDevices {
 
   wizard::WizardBackend backend(ImageWriter* writer) override;
   void pause_perception(Session* session) override;
-  void resume_perception() override { perception_->start(); }
+  void resume_perception() override;
   bool waits_for_result() const override { return false; }
 
  private:
@@ -35,6 +35,7 @@ class DeviceCapture final : public CaptureDevices {
     Frame frame;
     double period_s;
   };
+  void want_every_image(bool is_wanted);
   Status show_pattern(std::size_t projector, const cv::Mat& image);
   Result<cv::Mat> grab(const std::string& camera);
 

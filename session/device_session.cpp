@@ -59,8 +59,12 @@ class DeviceSource final : public FrameSource {
 // Projectors and screens. One that fails is reported and tried again.
 class DeviceSink final : public FrameSink {
  public:
-  DeviceSink(SessionDevices* devices, const Session* session, DeviceHealth* health, DeviceClock* clock)
-      : devices_(devices), session_(session), health_(health), clock_(clock) {
+  DeviceSink(SessionDevices* devices,
+             const Session* session,
+             CameraThreads* cameras,
+             DeviceHealth* health,
+             DeviceClock* clock)
+      : devices_(devices), session_(session), cameras_(cameras), health_(health), clock_(clock) {
     for (const auto& display : devices->projectors) projectors_.push_back(added(display.get(), "projector"));
     for (const auto& display : devices->screens) screens_.push_back(added(display.get(), "screen"));
   }
@@ -97,8 +101,13 @@ class DeviceSink final : public FrameSink {
     return out;
   }
 
-  // A screen that shows `off` is black, and so is a wall that the viewer is behind.
+  // Screens show every image of their camera. One that shows `off` is black, and so is a wall that the viewer
+  // is behind.
   void show_screens(std::span<const ScreenImages> images) override {
+    const Rig& rig = session_->setup().rig;
+    cameras_->want_every_image(
+        rig.cameras[rig.first_visible_camera()].name,
+        std::ranges::any_of(images, [](const auto& drawn) { return !drawn.images.left.empty(); }));
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       device::Display* screen = devices_->screens[i].get();
       if (!screen) continue;
@@ -135,6 +144,7 @@ class DeviceSink final : public FrameSink {
 
   SessionDevices* devices_;
   const Session* session_;
+  CameraThreads* cameras_;
   DeviceHealth* health_;
   DeviceClock* clock_;
   std::vector<std::size_t> projectors_, screens_;  // in health_
@@ -189,7 +199,7 @@ Status play_on_devices(SessionDevices* devices,
   CameraThreads cameras(health);
   DeviceClock clock;
   start_cameras(devices, health.get(), &cameras);
-  DeviceSink sink(devices, &parts.session, health.get(), &clock);
+  DeviceSink sink(devices, &parts.session, &cameras, health.get(), &clock);
   KeyClient keys(devices->keys, parts.session.setup().scene, devices->chosen, health.get());
   note_missing(*devices, health.get(), &parts.output.telemetry());
   SceneFilesClient files(parts.session.setup().scene.folder);

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <numbers>
+#include <utility>
 
-#include "core/image_io.h"
 #include "core/names.h"
 #include "core/stopwatch.h"
 #include "tracker/body_correspondences.h"
@@ -20,45 +20,6 @@ constexpr int k_known_after = 5;
 constexpr double k_forgotten_s = 2;
 constexpr double k_still_m = 0.005, k_still_rad = 5 * std::numbers::pi / 180;
 constexpr double k_lying_m = 0.01, k_lying_rad = 45 * std::numbers::pi / 180;
-constexpr double k_once_s = 0.4;  // gestures of two cameras within this time are one use
-// While all of the scene's markers are seen, full searches are k_rarer times rarer. Only every
-// k_covered_every-th search also looks for partly covered markers.
-constexpr int k_rarer = 3;
-constexpr int k_covered_every = 2;
-// If the time between images grows by more than this factor, markers are not extrapolated.
-constexpr double k_like_moments = 3;
-
-// Whether a marker has moved by more than its corners' noise.
-bool has_moved(const tracker::Detection& now, const tracker::Detection& before) {
-  constexpr double k_deviations = 3;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double variance = (now.corner_covariance[i] + before.corner_covariance[i]).trace();
-    if ((now.corners_px[i] - before.corners_px[i]).squaredNorm() > k_deviations * k_deviations * variance)
-      return true;
-  }
-  return false;
-}
-
-// Predicts markers `seconds` ahead, with the image motion that they had in the `seconds_before`.
-std::vector<tracker::Detection> predicted_detections(const std::vector<tracker::Detection>& last,
-                                                     const std::vector<tracker::Detection>& before,
-                                                     double seconds,
-                                                     double seconds_before) {
-  std::vector<tracker::Detection> next = last;
-  if (!(seconds_before > 0 && seconds > 0 && seconds < k_like_moments * seconds_before)) return next;
-  for (tracker::Detection& marker : next) {
-    const tracker::Detection* was = nullptr;  // the nearest earlier one with that name
-    const auto moved = [&](const tracker::Detection& other) {
-      return (marker.corners_px[0] - other.corners_px[0]).norm();
-    };
-    for (const tracker::Detection& other : before)
-      if (other.marker == marker.marker && (!was || moved(other) < moved(*was))) was = &other;
-    if (!was || !has_moved(marker, *was)) continue;
-    for (std::size_t i = 0; i < 4; ++i)
-      marker.corners_px[i] += seconds / seconds_before * (marker.corners_px[i] - was->corners_px[i]);
-  }
-  return next;
-}
 
 // The families of all bodies and controls.
 std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body> bodies) {
@@ -69,32 +30,36 @@ std::vector<std::string> families_of(const scene::Scene& scene, std::vector<Body
 
 }  // namespace
 
+Result<tracker::CameraDetectorSetup> camera_detector_setup(const scene::Scene& scene, int full_scan_every) {
+  LIMN_CHECK(full_scan_every > 0);
+  const std::vector<Body> bodies = scene::bodies(scene);
+  LIMN_TRY(tracker::Families families, tracker::Families::load(families_of(scene, bodies), scene.folder));
+  tracker::CameraDetectorSetup out{.families = std::move(families),
+                                   .finds_balls = !scene::constellations(scene).empty(),
+                                   .full_scan_every = full_scan_every};
+  for (const Body& body : bodies)
+    for (const BodyMarker& marker : body.markers) out.used.push_back(marker.marker);
+  for (const scene::Control& control : scene.controls) {
+    out.used.push_back(control.marker);
+    out.controls.emplace_back(control.marker, control.gesture);
+  }
+  return out;
+}
+
 Result<Perception> Perception::create(const scene::Scene& scene,
                                       const Rig& rig,
                                       const PerceptionOptions& options) {
-  LIMN_CHECK(options.full_scan_every > 0);
+  LIMN_TRY(const tracker::CameraDetectorSetup watched, camera_detector_setup(scene, options.full_scan_every));
   Perception out;
+  out.used_ = watched.used;
   out.rig_ = rig;
   out.options_ = options;
   out.bodies_ = scene::bodies(scene);
   out.constellations_ = scene::constellations(scene);
   out.loose_size_m_ = scene::first_marker_size_m(scene);
-  for (const Body& body : out.bodies_)
-    for (const BodyMarker& marker : body.markers) out.used_.push_back(marker.marker);
-  for (const scene::Control& control : scene.controls) out.used_.push_back(control.marker);
-  LIMN_TRY(const tracker::Families families,
-           tracker::Families::load(families_of(scene, out.bodies_), scene.folder));
-  std::vector<tracker::GestureReader> gestures;
-  for (const scene::Control& control : scene.controls) {
-    gestures.emplace_back(control.marker, control.gesture);
-  }
-  for (const Imager& camera : rig.cameras) {
-    const tracker::Encoding encoding = tracker::encoding_of(rig, camera);
-    out.camera_states_.push_back({.detector = tracker::Detector(families, {.encoding = encoding}),
-                                  .gestures = gestures,
-                                  .ball_finder = tracker::BallFinder({.encoding = encoding})});
-  }
-  out.used_at_.resize(scene.controls.size());
+  for (const Imager& camera : rig.cameras)
+    out.detectors_.emplace_back(watched, camera.lens, tracker::encoding_of(rig, camera));
+  out.uses_.emplace(rig.cameras.size(), scene.controls.size());
   out.percepts_.frames.resize(rig.cameras.size());
   out.percepts_.detections.resize(rig.cameras.size());
   for (const tracker::FeedSetup& feed : options.feeds) out.feeds_.emplace_back(feed);
@@ -114,14 +79,21 @@ const Percepts& Perception::watch(std::span<const Frame> frames, const FeedInput
   percepts_.uses.clear();
   percepts_.feed_notes = input.notes;
   std::vector<std::size_t> cameras;
+  std::vector<const tracker::CameraDetections*> found;
   for (const Frame& frame : frames) {
-    const Imager* camera = find_named(rig_.cameras, frame.camera);
-    LIMN_CHECK(camera != nullptr);
-    cameras.push_back(static_cast<std::size_t>(camera - rig_.cameras.data()));
-    update_camera(cameras.back(), frame);
-    percepts_.captured_at = std::max(percepts_.captured_at, frame.captured_at);
+    cameras.push_back(number_of(frame.camera));
+    percepts_.frames[cameras.back()] = frame;
+    found.push_back(&detect(cameras.back(), frame));
+    note_found(cameras.back(), *found.back());
   }
-  read_gestures(cameras);
+  for (const tracker::CameraDetections& sent : input.detections) {
+    cameras.push_back(number_of(sent.camera));
+    found.push_back(&sent);
+    note_found(cameras.back(), sent);
+  }
+  for (const Frame& image : input.images) percepts_.frames[number_of(image.camera)] = image;
+  for (std::size_t i = 0; i < cameras.size(); ++i)
+    std::ranges::copy(uses_->read(cameras[i], *found[i]), std::back_inserter(percepts_.uses));
   percepts_.detect_ms = milliseconds_since(begun);
 
   note_loose(cameras);
@@ -189,44 +161,25 @@ void Perception::follow_feeds(bool has_frames, const FeedInput& input) {
   }
 }
 
-void Perception::update_camera(std::size_t camera, const Frame& frame) {
-  CameraState& state = camera_states_[camera];
-  percepts_.frames[camera] = frame;
-  state.grey = frame.grey.empty() ? to_grey(frame.image) : frame.grey;
-  if (!constellations_.empty())
-    percepts_.balls[camera] = state.ball_finder.find(state.grey, rig_.cameras[camera].lens);
-  if (!used_.empty()) find_markers(camera, frame.captured_at);
+std::size_t Perception::number_of(const std::string& name) const {
+  const Imager* camera = find_named(rig_.cameras, name);
+  LIMN_CHECK(camera != nullptr);
+  return static_cast<std::size_t>(camera - rig_.cameras.data());
 }
 
-// Follows known markers near their predicted positions. Searches the whole image for others from time to
-// time, and when a marker is gone.
-void Perception::find_markers(std::size_t camera, Stamp captured_at) {
-  CameraState& state = camera_states_[camera];
-  const Lens* lens = &rig_.cameras[camera].lens;
-  std::vector<tracker::Detection>& detections = percepts_.detections[camera];
-  const double seconds = seconds_between(state.seen_at, captured_at);
-  const std::vector<tracker::Detection> next =
-      predicted_detections(detections, state.before, seconds, std::exchange(state.seconds, seconds));
-  state.seen_at = captured_at;
-  std::swap(state.before, detections);
-  state.detector.follow(state.grey, lens, next, &detections);
-  const bool is_one_gone = detections.size() < next.size();
-  if (--state.until_search > 0 && !is_one_gone) return;
-  const bool covered = state.searches++ % k_covered_every == 0 || !all_are_seen();
-  state.detector.detect_more(state.grey, lens, &detections,
-                             covered ? tracker::Reading::covered : tracker::Reading::open);
-  state.until_search = (all_are_seen() ? k_rarer : 1) * options_.full_scan_every;
-}
-
-// Whether each marker that bodies and controls use is seen by some camera.
-bool Perception::all_are_seen() const {
-  return std::all_of(used_.begin(), used_.end(), [&](const MarkerName& used) {
-    return std::any_of(percepts_.detections.begin(), percepts_.detections.end(), [&](const auto& of_camera) {
-      return std::any_of(of_camera.begin(), of_camera.end(), [&](const tracker::Detection& detection) {
-        return tracker::is_marker(detection.marker, used);
-      });
-    });
+const tracker::CameraDetections& Perception::detect(std::size_t camera, const Frame& frame) {
+  return detectors_[camera].detect(frame, [&](const MarkerName& used) {
+    for (std::size_t i = 0; i < detectors_.size(); ++i)
+      for (const tracker::Detection& detection : percepts_.detections[i])
+        if (i != camera && tracker::is_marker(detection.marker, used)) return true;
+    return false;
   });
+}
+
+void Perception::note_found(std::size_t camera, const tracker::CameraDetections& found) {
+  percepts_.detections[camera] = found.detections;
+  if (!constellations_.empty()) percepts_.balls[camera] = found.balls;
+  percepts_.captured_at = std::max(percepts_.captured_at, found.captured_at);
 }
 
 // Notes seen markers that the scene does not use (of the scene's families).
@@ -276,34 +229,6 @@ void Perception::follow_loose() {
   }
   std::stable_sort(percepts_.loose.begin(), percepts_.loose.end(),
                    [](const LooseMarker& a, const LooseMarker& b) { return a.still_since < b.still_since; });
-}
-
-// A control is used when one camera sees the gesture and no other camera sees the marker uncovered. If
-// several controls are hidden together, only the one hidden last counts: the arm hides the others on the
-// hand's way.
-void Perception::read_gestures(std::span<const std::size_t> cameras) {
-  for (const std::size_t camera : cameras) {
-    std::vector<tracker::GestureReader>& gestures = camera_states_[camera].gestures;
-    const Stamp at = percepts_.frames[camera].captured_at;
-    std::vector<int> steps;
-    for (tracker::GestureReader& gesture : gestures)
-      steps.push_back(gesture.read(camera_states_[camera].grey, percepts_.detections[camera], at));
-    for (std::size_t i = 0; i < gestures.size(); ++i) {
-      if (steps[i] == 0) continue;
-      const bool is_seen_elsewhere =
-          !gestures[i].is_seen() &&
-          std::any_of(camera_states_.begin(), camera_states_.end(), [&](const CameraState& other) {
-            return &other.gestures != &gestures && other.gestures[i].is_seen();
-          });
-      const bool is_arms = std::any_of(gestures.begin(), gestures.end(), [&](const auto& other) {
-        return gestures[i].hidden_since() && other.hidden_since() > gestures[i].hidden_since();
-      });
-      const bool is_known = used_at_[i] != Stamp{} && seconds_between(used_at_[i], at) < k_once_s;
-      if (is_seen_elsewhere || is_arms || is_known) continue;
-      used_at_[i] = at;
-      percepts_.uses.push_back({i, steps[i]});
-    }
-  }
 }
 
 }  // namespace limn::session

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,20 +13,15 @@
 #include "core/rig.h"
 #include "core/track.h"
 #include "scene/scene.h"
-#include "tracker/balls/ball_finder.h"
 #include "tracker/balls/constellation_filter.h"
 #include "tracker/body_filter.h"
-#include "tracker/detector.h"
+#include "tracker/cameras/camera_detector.h"
+#include "tracker/cameras/control_uses.h"
 #include "tracker/feeds/foreign_tracker.h"
-#include "tracker/gesture.h"
 
 namespace limn::session {
 
-/// A use of a control of the scene. `control` is its index; `steps` is -1 for a turn backwards.
-struct ControlUse {
-  std::size_t control = 0;
-  int steps = 1;
-};
+using tracker::ControlUse;
 
 /// A marker may be paired after it has been still for this long; seconds.
 inline constexpr double k_lies_after_s = 1;
@@ -41,22 +37,29 @@ struct LooseMarker {
   Stamp still_since;
 };
 
-/// What other tracking systems have sent since the moment before: the poses of each, in the order of
-/// PerceptionOptions::feeds, and messages about what was refused.
+/// What other tracking systems and the nodes of a room have sent since the moment before.
 struct FeedInput {
+  /// The poses of each tracking system, in the order of PerceptionOptions::feeds.
   std::vector<std::vector<tracker::ArrivedPose>> poses = {};
-  std::vector<std::string> notes = {};
+  std::vector<std::string> notes = {};  ///< about what was refused
+  /// What cameras show whose nodes detect, the newest, at most one per camera.
+  std::vector<tracker::CameraDetections> detections = {};
+  /// Images of such cameras. They are shown and compared, but nothing is detected in them.
+  std::vector<Frame> images = {};
 
-  bool is_empty() const {
-    return std::ranges::all_of(poses, [](const auto& of_feed) { return of_feed.empty(); });
+  bool has_poses() const {
+    return !std::ranges::all_of(poses, [](const auto& of_feed) { return of_feed.empty(); });
   }
+  bool is_empty() const { return !has_poses() && detections.empty() && images.empty(); }
 };
 
 /// The results of perception after the frames of one moment.
 struct Percepts {
-  std::vector<Frame> frames;                                ///< newest of each camera, in the rig's order
-  std::vector<std::vector<tracker::Detection>> detections;  ///< in these frames, one list per camera
-  std::vector<std::vector<tracker::Ball>> balls;  ///< in these frames; empty when the scene has none
+  /// The newest image of each camera, in the rig's order. A camera at a node may have none, or detections
+  /// that are newer.
+  std::vector<Frame> frames;
+  std::vector<std::vector<tracker::Detection>> detections;  ///< the newest, one list per camera
+  std::vector<std::vector<tracker::Ball>> balls;            ///< the newest; empty when the scene has none
   std::size_t screen_camera = 0;  ///< the first camera that sees visible light: screens show its frames
   std::vector<tracker::BodyFilter> motions;  ///< by the cameras and other tracking systems
   std::vector<LooseMarker> loose;  ///< tracked loose markers, the one that is still for longest first
@@ -79,6 +82,9 @@ struct PerceptionOptions {
   std::vector<tracker::FeedSetup> feeds = {};  ///< other tracking systems
 };
 
+/// What is searched for in the images of a session's cameras. Error: a family that cannot be loaded.
+Result<tracker::CameraDetectorSetup> camera_detector_setup(const scene::Scene& scene, int full_scan_every);
+
 /// The camera side of a session: frames -> markers and balls -> motions of bodies, and gestures of control
 /// markers. Its only clock is the frames' stamps, so the same frames give the same results.
 class Perception {
@@ -92,22 +98,13 @@ class Perception {
   /// systems.
   Result<Perception> successor(const scene::Scene& scene, const Rig& rig) const;
 
-  /// Processes the frames of one moment, at most one per camera, and what other tracking systems have sent; a
-  /// camera without a frame keeps its last detections. The result stays valid until the next call.
+  /// Processes the frames of one moment, at most one per camera, and what other tracking systems and nodes
+  /// have sent; a camera without a frame or detections keeps its last detections. The result stays valid
+  /// until the next call.
   const Percepts& watch(std::span<const Frame> frames, const FeedInput& input = {});
   const Percepts& percepts() const { return percepts_; }
 
  private:
-  struct CameraState {
-    tracker::Detector detector;
-    std::vector<tracker::GestureReader> gestures;  // one per control
-    int until_search = 0, searches = 0;
-    std::vector<tracker::Detection> before = {};  // detections in the image before the newest
-    Stamp seen_at = {};                           // stamp of the newest image
-    double seconds = 0;                           // time between the last two images
-    cv::Mat grey = {};                            // the newest image
-    tracker::BallFinder ball_finder = tracker::BallFinder();
-  };
   struct Loose {
     MarkerName marker;
     int moments = 0;  // number of moments in which it was seen
@@ -116,15 +113,14 @@ class Perception {
     Stamp still_since;
   };
   Perception() = default;
-  void update_camera(std::size_t camera, const Frame& frame);
-  void find_markers(std::size_t camera, Stamp captured_at);
+  std::size_t number_of(const std::string& camera) const;
+  const tracker::CameraDetections& detect(std::size_t camera, const Frame& frame);
+  void note_found(std::size_t camera, const tracker::CameraDetections& found);
   void filter(std::span<const std::size_t> cameras, const FeedInput& input);
   void filter_seen(std::span<const std::size_t> cameras);
-  bool all_are_seen() const;
   void note_loose(std::span<const std::size_t> cameras);
   void follow_loose();
   void follow_feeds(bool has_frames, const FeedInput& input);
-  void read_gestures(std::span<const std::size_t> cameras);
 
   Rig rig_;
   PerceptionOptions options_;
@@ -133,9 +129,9 @@ class Perception {
   double loose_size_m_ = 0;
   std::vector<MarkerName> used_;  // markers of bodies and controls
   std::vector<Loose> loose_;
-  std::vector<CameraState> camera_states_;  // one per camera
-  std::vector<Stamp> used_at_;              // one per control
-  std::vector<tracker::BodyFilter> seen_;   // motions by the cameras alone
+  std::vector<tracker::CameraDetector> detectors_;  // one per camera
+  std::optional<tracker::ControlUses> uses_;
+  std::vector<tracker::BodyFilter> seen_;  // motions by the cameras alone
   std::vector<tracker::ForeignTracker> feeds_;
   Percepts percepts_;
 };

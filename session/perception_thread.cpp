@@ -40,12 +40,15 @@ void PerceptionThread::stop() {
 
 void PerceptionThread::run() try {
   while (!is_stopping_) {
-    auto newest = cameras_->take_frames(k_frames_wait);
-    const FeedInput input = feeds_ ? feeds_->received(now(), true) : FeedInput();
+    auto newest = cameras_->take_output(k_frames_wait);
+    FeedInput input = feeds_ ? feeds_->received(now(), true) : FeedInput();
     if (!newest && input.is_empty()) continue;
     std::vector<Frame> frames;
-    if (newest)
-      for (auto& [name, frame] : *newest) frames.push_back(std::move(frame));
+    if (newest) {
+      for (auto& [name, frame] : newest->frames) frames.push_back(std::move(frame));
+      for (auto& [name, image] : newest->images) input.images.push_back(std::move(image));
+      for (auto& [name, found] : newest->detections) input.detections.push_back(std::move(found));
+    }
     std::sort(frames.begin(), frames.end(),
               [](const Frame& a, const Frame& b) { return a.captured_at < b.captured_at; });
     if (recorder_) recorder_->record_frames(frames, input);

@@ -150,18 +150,29 @@ Result<std::unique_ptr<Recorder>> Recorder::begin(const fs::path& folder, const 
 void Recorder::record_frames(std::span<const Frame> frames, const FeedInput& input) {
   const std::lock_guard lock(mutex_);
   if (ended_) return;
-  nlohmann::ordered_json event = {{"watch", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json event;
+  if (!queue_images(frames, &event["watch"])) return;
+  if (input.has_poses()) event["feeds"] = feeds_json(input);
+  for (const tracker::CameraDetections& found : input.detections)
+    event["detections"].push_back(tracker::to_json(found));
+  if (!input.images.empty() && !queue_images(input.images, &event["images"])) return;
+  write(event);
+}
+
+bool Recorder::queue_images(std::span<const Frame> frames, nlohmann::ordered_json* list) {
+  *list = nlohmann::ordered_json::array();
   for (const Frame& frame : frames) {
     const std::string file =
         fmt::format("frames/{}/{:06}.{}", frame.camera, frames_++, frame.jpeg ? "jpg" : "png");
     if (!(frame.jpeg ? images_.offer(folder_ / file, frame.jpeg)
-                     : images_.offer(folder_ / file, frame.image)))
-      return end("the disk is full or too slow for the cameras' images");
-    event["watch"].push_back(
+                     : images_.offer(folder_ / file, frame.image))) {
+      end("the disk is full or too slow for the cameras' images");
+      return false;
+    }
+    list->push_back(
         {{"camera", frame.camera}, {"file", file}, {"captured_at_ns", nanoseconds(frame.captured_at)}});
   }
-  if (!input.is_empty()) event["feeds"] = feeds_json(input);
-  write(event);
+  return true;
 }
 
 void Recorder::record_scene(const scene::Scene& scene) {
@@ -271,6 +282,9 @@ nlohmann::ordered_json pose_log(const ComposedFrame& composed) {
 
 FeedInput recorded_feeds(const nlohmann::ordered_json& event) {
   FeedInput input;
+  if (event.contains("detections"))
+    for (const auto& found : event.at("detections"))
+      input.detections.push_back(tracker::camera_detections_of(found));
   if (!event.contains("feeds")) return input;
   for (const auto& list : event.at("feeds")) {
     input.poses.emplace_back();

@@ -43,8 +43,8 @@ class Recorder {
   static Result<std::unique_ptr<Recorder>> create(const std::filesystem::path& folder,
                                                   const SessionSetup& setup);
 
-  /// Records the frames of one moment and what other tracking systems have sent, as they are passed to
-  /// Perception::watch.
+  /// Records the frames of one moment and what other tracking systems and nodes have sent, as they are passed
+  /// to Perception::watch.
   void record_frames(std::span<const Frame> frames, const FeedInput& input = {});
   /// To be called when the scene's files have changed: copies them as they are now.
   void record_scene(const scene::Scene& scene);
@@ -71,8 +71,10 @@ class Recorder {
   // Writes the setup and opens the log; on an error parts of it may be in the folder.
   static Result<std::unique_ptr<Recorder>> begin(const std::filesystem::path& folder,
                                                  const SessionSetup& setup);
-  void write(const nlohmann::ordered_json& event);  // call with mutex_ held
-  void end(const std::string& why);                 // call with mutex_ held
+  // Call these with mutex_ held. The first one is false when the recording has ended.
+  bool queue_images(std::span<const Frame> frames, nlohmann::ordered_json* list);
+  void write(const nlohmann::ordered_json& event);
+  void end(const std::string& why);
 
   std::filesystem::path folder_;
   ImageWriter images_;
@@ -88,8 +90,8 @@ std::uint64_t fingerprint(std::span<const cv::Mat> images);
 /// The part of a line of events.jsonl that a replay compares: stamps, tracks and parts, with all digits.
 nlohmann::ordered_json pose_log(const ComposedFrame& composed);
 
-/// Reads the poses of other tracking systems in a `watch` event; throws nlohmann::json::exception on a
-/// damaged one.
+/// Reads the poses of other tracking systems and the detections of nodes' cameras in a `watch` event, without
+/// their images; throws nlohmann::json::exception on a damaged one.
 FeedInput recorded_feeds(const nlohmann::ordered_json& event);
 
 /// Reads the image of a recorded frame; the camera's name and the stamp are not in the file. Error: the file

@@ -29,8 +29,9 @@ bool is_from_host(Topic topic) {
   return topic == Topic::setup || topic == Topic::moment || topic == Topic::order ||
          topic == Topic::screen_image;
 }
-bool is_sent(Topic topic, bool is_host) { return is_host || !is_from_host(topic); }
-bool is_received(Topic topic, bool is_host) { return !is_host || !is_from_host(topic); }
+bool is_for_host(Topic topic) { return topic == Topic::detections; }
+bool is_sent(Topic topic, bool is_host) { return is_host ? !is_for_host(topic) : !is_from_host(topic); }
+bool is_received(Topic topic, bool is_host) { return is_sent(topic, !is_host); }
 
 class DdsEngine final : public Engine {
  public:

@@ -86,6 +86,8 @@ TopicDescription description_of(Topic topic) {
       return {"limn_v1_answer", &limn_v1_Answer_desc};
     case Topic::health:
       return {"limn_v1_health", &limn_v1_Health_desc};
+    case Topic::detections:
+      return {"limn_v1_detections", &limn_v1_Detections_desc};
   }
   return {};
 }

@@ -70,6 +70,7 @@ const std::map<std::string, std::map<std::string, int>>& inner_order() {
       {"wizard", {{"wizard/capture", 0}, {"wizard/measure", 0}, {"wizard", 1}, {"wizard/window", 2}}},
       {"remote",
        {{"remote/http", 0}, {"remote/tablet", 0}, {"remote/glasses", 0}, {"remote/api", 1}, {"remote", 2}}},
+      {"tracker", {{"tracker", 0}, {"tracker/balls", 1}, {"tracker/feeds", 1}, {"tracker/cameras", 2}}},
   };
   return order;
 }

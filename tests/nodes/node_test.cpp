@@ -19,6 +19,7 @@
 #include "nodes/node_frames.h"
 #include "nodes/remote_devices.h"
 #include "nodes/room_host.h"
+#include "session/camera_threads.h"
 #include "session/frame_composer.h"
 #include "sim/virtual_rig.h"
 #include "tests/nodes/memory_room.h"
@@ -94,13 +95,14 @@ class NodeTest : public ::testing::Test {
     setup_.scene = *world_.scene;
   }
 
-  void open_host() {
+  void open_host(const std::vector<device::CameraConfig>& cameras = {}) {
     const Imager& projector = setup_.rig.projectors[1];
     device::Devices devices;
     devices.displays = {
         offscreen(projector.name, "left", {projector.width, projector.height}),
         // It cannot be opened, because nodes of tests have no desktop.
         {.name = "screen0", .host = "left", .kind = device::DisplayKind::window, .size = {64, 36}}};
+    devices.cameras = cameras;
     host_ = std::make_unique<Room>(std::make_unique<test::MemoryLink>(&room_, "host"));
     client_ = RoomHost::open(host_.get(), &files_, devices, folder_ / "host", AppendLog(), &setup_).value();
     ASSERT_TRUE(host_->offer({.is_host = true, .version = std::string(version())}).ok());
@@ -276,6 +278,57 @@ TEST_F(NodeTest, ABlackFrameWaitsForNothing) {
   }
   EXPECT_EQ(last_shown(folder_, 4), black);
   EXPECT_LT(1e-9 * static_cast<double>(std::stoll(last_shown(folder_, 3)) - sent_ns), 0.12);
+}
+
+// The node sends what its camera shows; the host's poses are those of the same images searched here.
+TEST_F(NodeTest, DetectsBesideItsCamera) {
+  fs::create_directories(folder_ / "images");
+  const int first = 0;
+  const Frame image = rig_.expose(std::span(&first, 1))[0];
+  ASSERT_TRUE(write_png(folder_ / "image.png", image.image).ok());
+  for (int i = 0; i < 900; ++i)
+    fs::create_symlink(folder_ / "image.png", folder_ / fmt::format("images/{:03}.png", i));
+  device::CameraConfig config{.name = "camera0", .host = "left", .source = (folder_ / "images").string()};
+  config.size = image.image.size();
+  open_host({config});
+  RoomOpener opener(host_.get(), nullptr);
+  auto camera = opener.camera(config);
+  ASSERT_TRUE(camera) << camera.message();
+  RunningNode node(&room_, "left", folder_ / "node");
+  const auto health = std::make_shared<session::DeviceHealth>();
+  session::CameraThreads threads(health);
+  threads.add(std::move(*camera), health->add({"camera0", "camera"}));
+  const Stamp begun = now();
+
+  session::Perception here = session::Perception::create(setup_.scene, setup_.rig).value();
+  Frame same = image;
+  std::size_t detections = 0, images = 0;
+  while (detections < 30 || images < 2) {
+    ASSERT_LT(seconds_between(begun, now()), 30) << detections << " detections, " << images << " images";
+    const auto output = threads.take_output(50ms);
+    if (!output) continue;
+    EXPECT_TRUE(output->frames.empty());
+    for (const auto& [name, got] : output->images) {
+      EXPECT_LT(cv::norm(got.image, image.image, cv::NORM_L1) / static_cast<double>(image.image.total()), 6);
+      ++images;
+    }
+    for (const auto& [name, found] : output->detections) {
+      ++detections;
+      EXPECT_LT(seconds_between(found.captured_at, now()), 1);
+      perception_->watch({}, {.detections = {found}});
+      same.captured_at = found.captured_at;
+      here.watch(std::span(&same, 1));
+    }
+  }
+  EXPECT_LT(images, detections / 2);  // at most five a second
+  const std::vector<Track>&there = perception_->percepts().tracks, &wanted = here.percepts().tracks;
+  ASSERT_EQ(there.size(), wanted.size());
+  ASSERT_FALSE(wanted.empty());
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    EXPECT_EQ(there[i].body, wanted[i].body);
+    EXPECT_LT((there[i].world_from_body.translation - wanted[i].world_from_body.translation).norm(), 1e-4);
+    EXPECT_LT(angle_between(there[i].world_from_body.rotation, wanted[i].world_from_body.rotation), 1e-3);
+  }
 }
 
 TEST_F(NodeTest, ShowsAndGrabsForACalibration) {

@@ -137,7 +137,7 @@ void fields(F& f, ClockAnswer& x) {
 }
 template <class F>
 void fields(F& f, Order& x) {
-  f.machine(x.to), f(x.number), f.one_of(x.what, 4), f(x.device), f.bytes(x.image), f(x.at);
+  f.machine(x.to), f(x.number), f.one_of(x.what, 5), f(x.device), f.bytes(x.image), f(x.at);
 }
 template <class F>
 void fields(F& f, Answer& x) {
@@ -151,6 +151,26 @@ template <class F>
 void fields(F& f, Health& x) {
   f(x.shown), f(x.missed), f(x.latency_s), f(x.draw_ms), f(x.late_ms), f(x.clock_offset_s),
       f(x.clock_stddev_s), f(x.problems), f(x.has_no_host), f(x.refreshes), f(x.screen_problems);
+}
+template <class F>
+void fields(F& f, tracker::Detection& x) {
+  f(x.marker), f.share(x.score);
+  for (std::size_t i = 0; i < 4; ++i)
+    f.pixel(x.corners_px[i]), f.covariance(x.corner_covariance[i]), f(x.corner_visible[i]);
+}
+template <class F>
+void fields(F& f, tracker::Ball& x) {
+  f.direction(x.d_centre), f.share(x.half_angle), f.pixel(x.centre_px), f.covariance(x.centre_covariance),
+      f.share(x.radius_px), f.share(x.half_angle_stddev), f(x.contrast), f(x.blur_px);
+}
+template <class F>
+void fields(F& f, tracker::GestureReading& x) {
+  f(x.forward), f(x.backward), f(x.is_seen), f(x.hidden_since);
+}
+template <class F>
+void fields(F& f, Detections& x) {
+  f(x.setup), f(x.found.camera), f(x.found.captured_at), f(x.found.run), f(x.found.detections),
+      f(x.found.balls), f(x.found.controls);
 }
 template <class F>
 void fields(F& /*f*/, Departure& /*x*/) {}
@@ -219,6 +239,16 @@ class Filling {
     x = static_cast<Enum>(below(count));
   }
   void index(std::size_t& x) { x = below(64); }
+  void share(double& x) { x = uniform(rng_, 1e-9, 1); }
+  void direction(Eigen::Vector3d& x) {
+    x = Eigen::Vector3d(uniform(rng_, -1, 1), uniform(rng_, -1, 1), uniform(rng_, 0.1, 1)).normalized();
+  }
+  void pixel(Eigen::Vector2d& x) { x = {uniform(rng_, -10, 4000), uniform(rng_, -10, 3000)}; }
+  void covariance(Eigen::Matrix2d& x) {
+    const Eigen::Matrix2d root{{uniform(rng_, 0.1, 1), uniform(rng_, -1, 1)}, {0, uniform(rng_, 0.1, 1)}};
+    x = root * root.transpose();
+    x(0, 1) *= 1 + 1e-15 * static_cast<double>(below(9));  // not symmetric to the last bit
+  }
   void image(cv::Mat& x, int channels) {
     x = cv::Mat();
     if (below(4) == 0) return;
@@ -293,6 +323,19 @@ class Printing {
     text += std::to_string(static_cast<int>(x)) + " ";
   }
   void index(std::size_t& x) { text += std::to_string(x) + " "; }
+  void share(double& x) { (*this)(x); }
+  template <class Vector>
+  void direction(Vector& x) {
+    (*this)(x);
+  }
+  template <class Vector>
+  void pixel(Vector& x) {
+    (*this)(x);
+  }
+  template <class Matrix>
+  void covariance(Matrix& x) {
+    (*this)(x);
+  }
   void image(cv::Mat& x, int /*channels*/) {
     text += fmt::format("{}x{} {} ", x.cols, x.rows, x.empty() ? 0 : x.type());
     for (int row = 0; row < x.rows; ++row)
@@ -308,7 +351,7 @@ class Printing {
 
 Message random_message(std::size_t kind, std::uint64_t seed, const std::string& to) {
   const std::array<Message, 10> kinds = {Offer{},       Setup{}, Moment{}, ScreenImage{}, ClockRequest{},
-                                         ClockAnswer{}, Order{}, Answer{}, Health{}};
+                                         ClockAnswer{}, Order{}, Answer{}, Health{},      Detections{}};
   Message message = kinds.at(kind);
   Filling filling(seed, to);
   std::visit([&](auto& one) { fields(filling, one); }, message);

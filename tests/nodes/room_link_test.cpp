@@ -83,7 +83,8 @@ TEST(RoomLink, DeliversEveryMessageToTheBit) {
   ASSERT_TRUE(wait_for<Offer>(*host, "beta"));
   for (const std::size_t kind :
        {test::kind_of<Offer>(), test::kind_of<ClockRequest>(), test::kind_of<ClockAnswer>(),
-        test::kind_of<Answer>(), test::kind_of<Health>()}) {  // those that a node may send
+        test::kind_of<Answer>(), test::kind_of<Health>(),
+        test::kind_of<Detections>()}) {  // those that a node may send
     for (std::uint64_t i = 0; i < 20; ++i) {
       const auto got = requested(*host, kind, i);
       ASSERT_TRUE(got) << "kind " << kind;

@@ -115,9 +115,67 @@ TEST(Wire, HostileOrdersAreRefused) {
   };
   std::string bad_name = "a/b";
   EXPECT_TRUE(found([](auto* /*wire*/) {}));
-  EXPECT_TRUE(found([](auto* wire) { wire->what = 3; }));
-  EXPECT_FALSE(found([](auto* wire) { wire->what = 4; }));
+  EXPECT_TRUE(found([](auto* wire) { wire->what = 4; }));
+  EXPECT_FALSE(found([](auto* wire) { wire->what = 5; }));
   EXPECT_FALSE(found([&](auto* wire) { wire->to = bad_name.data(); }));
+}
+
+// Detections as they come from a node, changed by `change`. The error's message, or "accepted".
+std::string verdict_on(const std::function<void(limn_v1_Detections*)>& change) {
+  Detections detections;
+  detections.found.camera = "camera0";
+  tracker::Detection marker;
+  marker.marker = {"aruco_4x4_50", "3"};
+  marker.corners_px.fill({10, 20});
+  marker.corner_covariance.fill(Eigen::Matrix2d{{0.01, 0.002}, {0.002, 0.02}});
+  detections.found.detections = {marker};
+  tracker::Ball ball;
+  ball.half_angle = 0.1;
+  ball.centre_covariance = marker.corner_covariance[0];
+  ball.radius_px = 5;
+  ball.half_angle_stddev = 1e-3;
+  detections.found.balls = {ball};
+  detections.found.controls = {{.forward = 2}};
+  const Message message = detections;
+  const WireSample sample = to_wire(message, k_sender);
+  limn_v1_Detections wire = *static_cast<const limn_v1_Detections*>(sample.sample.get());
+  change(&wire);
+  const auto back = from_wire(Topic::detections, &wire, {});
+  return back ? "accepted" : back.message();
+}
+
+TEST(Wire, HostileDetectionsAreRefused) {
+  constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(verdict_on([](limn_v1_Detections* /*wire*/) {}), "accepted");
+  const auto expect_refused = [](const std::string& field,
+                                 const std::function<void(limn_v1_Detections*)>& change) {
+    const std::string found = verdict_on(change);
+    EXPECT_EQ(found.rfind(field, 0), 0u) << found;
+  };
+  const auto corner = [](limn_v1_Detections* wire) -> limn_v1_Corner& {
+    return wire->markers._buffer[0].corners[2];
+  };
+  expect_refused("marker.corners", [&](auto* wire) { corner(wire).px[1] = k_nan; });
+  expect_refused("marker.corners", [&](auto* wire) { corner(wire).px[0] = 1e9; });
+  expect_refused("marker.covariance", [&](auto* wire) { corner(wire).covariance[0] = k_nan; });
+  expect_refused("marker.covariance", [&](auto* wire) { corner(wire).covariance[3] = -0.02; });
+  expect_refused("marker.covariance", [&](auto* wire) {  // indefinite
+    corner(wire).covariance[1] = corner(wire).covariance[2] = 0.5;
+  });
+  expect_refused("marker.covariance", [&](auto* wire) { corner(wire).covariance[1] = 0.003; });
+  expect_refused("marker.score", [](auto* wire) { wire->markers._buffer[0].score = 2; });
+  expect_refused("ball.d_centre", [](auto* wire) { wire->balls._buffer[0].d_centre.xyz[0] = 1; });
+  expect_refused("ball.half_angle:", [=](auto* wire) { wire->balls._buffer[0].half_angle = k_nan; });
+  expect_refused("ball.covariance", [](auto* wire) { wire->balls._buffer[0].covariance[0] = 0; });
+  expect_refused("ball.radius_px", [](auto* wire) { wire->balls._buffer[0].radius_px = -1; });
+  expect_refused("controls.forward", [](auto* wire) {
+    wire->controls._buffer[0].forward = std::numeric_limits<std::int32_t>::min();
+  });
+  std::vector<limn_v1_Gestures> many(5000);
+  expect_refused("controls", [&](auto* wire) {
+    wire->controls._buffer = many.data();
+    wire->controls._length = static_cast<std::uint32_t>(many.size());
+  });
 }
 
 TEST(Wire, FilesOutsideOfTheSessionAreRefused) {

@@ -119,7 +119,7 @@ TEST(CameraThreads, ACameraThatDoesNotComeBackIsLeft) {
   const std::size_t number = health->add({"camera0", "camera"});
   auto threads = std::make_unique<session::CameraThreads>(health);
   threads->add(std::make_unique<StuckCamera>(freed.get_future().share()), number);
-  EXPECT_FALSE(threads->take_frames(std::chrono::milliseconds(10)).has_value());
+  EXPECT_FALSE(threads->take_output(std::chrono::milliseconds(10)).has_value());
   const auto begun = std::chrono::steady_clock::now();
   testing::internal::CaptureStderr();
   threads.reset();

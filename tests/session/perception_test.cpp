@@ -5,13 +5,17 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/json_text.h"
 #include "session/script.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
 #include "tests/support/matchers.h"
+#include "tracker/camera_encoding.h"
 #include "tracker/predict.h"
 
 namespace limn::session {
@@ -141,40 +145,125 @@ TEST(Perception, FollowsMarkersThatMoveByMoreThanHalfTheirSideAnImage) {
   }
 }
 
+// A world with a control marker; a hand covers it between 0.4 and 1.5 s.
+class CoveredControl {
+ public:
+  CoveredControl() {
+    sim::World world = studio_world(0.5);
+    world.scene->controls = {{MarkerName::parse("aruco_4x4_50:9").value(), scene::ActionId::next_variant,
+                              "mirror", Gesture::cover}};
+    EXPECT_TRUE(
+        sim::add_marker(world,
+                        {world.scene->controls[0].marker, 0.05,
+                         Pose(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45})},
+                        false, tracker::marker_image));
+    scene = *world.scene;
+    rig.emplace(std::move(world), sim::VirtualRigOptions{.grab_waits_for_light = false});
+  }
+
+  // Calls `perceive` with each image of a camera and its time.
+  void play(const std::function<void(const Frame&, double)>& perceive) {
+    const auto script = load_script(
+        write_json(test::test_folder() / "script.json",
+                   script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
+    ASSERT_TRUE(script) << script.message();
+    auto room = ScriptedRoom::create(*script, &*rig);
+    ASSERT_TRUE(room);
+    for (int i = 0; i < 55; ++i) {
+      const double at_s = seconds_between(Stamp{}, rig->next_exposure());
+      room->set(at_s);
+      const int camera = 0;
+      perceive(rig->expose(std::span(&camera, 1))[0], at_s);
+    }
+  }
+
+  scene::Scene scene;
+  std::optional<sim::VirtualRig> rig;
+};
+
 TEST(Perception, ReadsWhatControlMarkersSay) {
-  sim::World world = studio_world(0.5);
-  world.scene->controls = {
-      {MarkerName::parse("aruco_4x4_50:9").value(), scene::ActionId::next_variant, "mirror", Gesture::cover}};
-  ASSERT_TRUE(
-      sim::add_marker(world,
-                      {world.scene->controls[0].marker, 0.05,
-                       Pose(Eigen::Quaterniond(0.707106781, -0.707106781, 0, 0), {-0.35, -0.15, 0.45})},
-                      false, tracker::marker_image));
-  const fs::path folder = test::test_folder();
-  const auto script =
-      load_script(write_json(folder / "script.json",
-                             script_of(2, {{{"at_s", 0.4}, {"until_s", 1.5}, {"cover", "aruco_4x4_50:9"}}})));
-  ASSERT_TRUE(script) << script.message();
-  const scene::Scene scene = *world.scene;
-  sim::VirtualRig rig(std::move(world), {.grab_waits_for_light = false});
-  auto room = ScriptedRoom::create(*script, &rig);
-  auto perception = Perception::create(scene, rig.world().rig);
-  ASSERT_TRUE(room);
+  CoveredControl control;
+  auto perception = Perception::create(control.scene, control.rig->world().rig);
   ASSERT_TRUE(perception);
   std::vector<double> used_s;
-  for (int i = 0; i < 55; ++i) {
-    const double at_s = seconds_between(Stamp{}, rig.next_exposure());
-    room->set(at_s);
-    const int camera = 0;
-    for (const ControlUse& use : perception->watch(rig.expose(std::span(&camera, 1))).uses) {
+  control.play([&](const Frame& frame, double at_s) {
+    for (const ControlUse& use : perception->watch(std::span(&frame, 1)).uses) {
       EXPECT_EQ(use.control, 0u);
       EXPECT_EQ(use.steps, 1);
       used_s.push_back(at_s);
     }
-  }
+  });
   ASSERT_EQ(used_s.size(), 1u);
   EXPECT_GT(used_s[0], 0.85);
   EXPECT_LT(used_s[0], 1.05);
+}
+
+// The state of all bodies with all digits.
+std::string text_of(const std::vector<Track>& tracks) {
+  std::string text;
+  for (const Track& track : tracks) {
+    text += fmt::format("{} {} {}", track.body, track.at.time_since_epoch().count(), track.rms_px);
+    for (const double value : track.world_from_body.matrix().reshaped()) text += fmt::format(" {:a}", value);
+    for (const double value : track.covariance.reshaped()) text += fmt::format(" {:a}", value);
+  }
+  return text;
+}
+
+// What a node sends, or a recording holds, is as good as the image itself. A use of a control is not lost
+// with the detections that first show it.
+TEST(Perception, DetectionsGiveTheSameAsImages) {
+  CoveredControl control;
+  const Rig& rig = control.rig->world().rig;
+  Perception by_images = Perception::create(control.scene, rig).value();
+  Perception by_detections = Perception::create(control.scene, rig).value();
+  Perception with_losses = Perception::create(control.scene, rig).value();
+  const tracker::CameraDetectorSetup setup =
+      camera_detector_setup(control.scene, PerceptionOptions().full_scan_every).value();
+  tracker::CameraDetector detector(setup, rig.cameras[0].lens, tracker::encoding_of(rig, rig.cameras[0]), 7);
+  std::vector<tracker::GestureReading> before;
+  int uses = 0, uses_with_losses = 0, lost = 0, tracked = 0;
+  control.play([&](const Frame& frame, double /*at_s*/) {
+    const std::string text = json_text(tracker::to_json(detector.detect(frame)));
+    const FeedInput input{.detections = {tracker::camera_detections_of(nlohmann::ordered_json::parse(text))}};
+    const Percepts& wanted = by_images.watch(std::span(&frame, 1));
+    const Percepts& found = by_detections.watch({}, input);
+    EXPECT_EQ(text_of(found.tracks), text_of(wanted.tracks));
+    EXPECT_EQ(found.captured_at, wanted.captured_at);
+    EXPECT_EQ(found.uses.size(), wanted.uses.size());
+    EXPECT_TRUE(found.frames[0].image.empty());
+    tracked += wanted.tracks.empty() ? 0 : 1;
+    uses += static_cast<int>(wanted.uses.size());
+    const std::vector<tracker::GestureReading>& controls = input.detections[0].controls;
+    const bool is_lost = !before.empty() && controls[0].forward > before[0].forward;
+    before = controls;
+    lost += is_lost;
+    if (!is_lost) uses_with_losses += static_cast<int>(with_losses.watch({}, input).uses.size());
+  });
+  EXPECT_GT(tracked, 40);
+  EXPECT_EQ(uses, 1);
+  EXPECT_EQ(lost, 1);
+  EXPECT_EQ(uses_with_losses, 1);
+}
+
+// A node that has another scene still, or a camera detector that counts anew, uses no control.
+TEST(Perception, CountsThatBeginAnewAreNoUses) {
+  CoveredControl control;
+  Perception perception = Perception::create(control.scene, control.rig->world().rig).value();
+  tracker::CameraDetections found{.camera = "camera0", .captured_at = shifted(Stamp{}, 1), .run = 1};
+  const auto uses = [&](std::uint64_t run, std::vector<tracker::GestureReading> controls) {
+    found.captured_at = shifted(found.captured_at, 1);
+    found.run = run;
+    found.controls = std::move(controls);
+    std::vector<int> steps;
+    for (const ControlUse& use : perception.watch({}, {.detections = {found}}).uses)
+      steps.push_back(use.steps);
+    return steps;
+  };
+  EXPECT_EQ(uses(1, {{.forward = 5}}), std::vector<int>());
+  EXPECT_EQ(uses(1, {{.forward = 6, .backward = 1}}), (std::vector<int>{1, -1}));
+  EXPECT_EQ(uses(1, {{.forward = 8}, {.forward = 1}}), std::vector<int>());
+  EXPECT_EQ(uses(2, {{.forward = 9}}), std::vector<int>());
+  EXPECT_EQ(uses(2, {{.forward = 10}}), std::vector<int>{1});
 }
 
 }  // namespace

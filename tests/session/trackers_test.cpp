@@ -1,4 +1,5 @@
-// Other tracking systems in a session: a feeder sends poses over the loopback interface.
+// Other tracking systems in a session (a feeder sends poses over the loopback interface), and cameras whose
+// images are searched elsewhere.
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
@@ -22,6 +23,7 @@
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
 #include "tests/support/matchers.h"
+#include "tracker/camera_encoding.h"
 
 namespace limn::session {
 namespace {
@@ -145,6 +147,53 @@ TEST(Trackers, AHiddenMarkersPartGoesOnInTheRightPlaceAndIsReplayed) {
   replay.session = folder / "recording";
   const Status replayed = apps::run_replay(replay);
   EXPECT_TRUE(replayed) << replayed.message();
+}
+
+// A camera whose node detects: the recording holds what it saw, and no images.
+TEST(CameraDetections, AreRecordedAndReplayedToTheLastBit) {
+  const fs::path folder = test::test_folder();
+  sim::World world = studio_world(0.6);
+  SessionSetup setup;
+  setup.rig = world.rig;
+  setup.scene = *world.scene;
+  sim::VirtualRig rig(std::move(world), virtual_rig_options(1 / 15.0));
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  const auto watched = camera_detector_setup(setup.scene, setup.watch.full_scan_every);
+  ASSERT_TRUE(watched) << watched.message();
+  tracker::CameraDetector detector(*watched, setup.rig.cameras[0].lens,
+                                   tracker::encoding_of(setup.rig, setup.rig.cameras[0]), 3);
+  {
+    auto output = SessionOutput::open(folder / "out", folder / "recording", &setup);
+    ASSERT_TRUE(output) << output.message();
+    auto perception = Perception::create(setup.scene, setup.rig, setup.watch);
+    auto session = Session::create(setup, &output->telemetry(), output->recorder(), false);
+    ASSERT_TRUE(perception && session);
+    for (std::size_t i = 1; i <= 8; ++i) {
+      const int camera = 0;
+      const Frame frame = rig.expose(std::span(&camera, 1))[0];
+      const FeedInput input{.detections = {detector.detect(frame)}};
+      output->recorder()->record_frames({}, input);
+      session->update_percepts(perception->watch({}, input), i);
+      session->compose_and_record(frame.captured_at, shifted(frame.captured_at, 0.05));
+    }
+    EXPECT_FALSE(session->composed().posed.parts.empty());
+    ASSERT_TRUE(output->close(&*session, false));
+  }
+  const fs::path events = folder / "recording/events.jsonl";
+  std::string text = read_file(events).value();
+  EXPECT_EQ(text.find("frames/"), std::string::npos);
+  apps::ReplayOptions replay;
+  replay.session = folder / "recording";
+  const Status replayed = apps::run_replay(replay);
+  EXPECT_TRUE(replayed) << replayed.message();
+
+  // Other corners give other poses.
+  const std::string key = "\"corners_px\":[[";
+  for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + 1))
+    text.insert(at + key.size(), "1");
+  ASSERT_TRUE(write_file(events, text).ok());
+  EXPECT_FALSE(apps::run_replay(replay));
 }
 
 // ---- the file ----
