@@ -37,14 +37,26 @@ Finding failed(const std::string& area, const std::string& name, const std::stri
   return {area, name, State::fails, message, ""};
 }
 
-// The package names in a packages.txt.
-std::vector<std::string> packages_in(const std::string& text) {
+// The release that an os-release file names, such as `trixie`; empty when it names none.
+std::string release_in(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("VERSION_CODENAME=")) continue;
+    std::erase(line, '"');
+    return line.substr(line.find('=') + 1);
+  }
+  return "";
+}
+
+// The package names in a packages.txt. A line `NAME [RELEASE]` counts only on that release.
+std::vector<std::string> packages_in(const std::string& text, const std::string& release) {
   std::vector<std::string> names;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);) {
-    line = line.substr(0, line.find('#'));
-    std::istringstream words(line);
-    for (std::string word; words >> word;) names.push_back(word);
+    std::istringstream words(line.substr(0, line.find('#')));
+    std::string name, only;
+    words >> name >> only;
+    if (!name.empty() && (only.empty() || only == "[" + release + "]")) names.push_back(name);
   }
   return names;
 }
@@ -77,7 +89,8 @@ Finding packages(const DoctorOptions& options) {
   if (!wanted || !status)
     return {"packages", "Debian", State::note,
             fmt::format("cannot be checked: {}", wanted ? status.message() : wanted.message()), ""};
-  const auto names = packages_in(*wanted);
+  const auto release = read_file(options.release);
+  const auto names = packages_in(*wanted, release ? release_in(*release) : "");
   const auto there = installed_in(*status);
   std::string missing;
   for (const std::string& name : names)

@@ -16,9 +16,11 @@ struct DoctorOptions {
   double show_s = 0;               ///< How long each output shows its own number and colour.
   RoomOptions room = {};           ///< A room whose machines are listed.
   bool json = false;               ///< Prints JSON instead of lines.
-  /// List of the packages needed, and Debian's own file of installed packages.
+  /// List of the packages needed, Debian's own file of installed packages, and the file that names its
+  /// release.
   std::filesystem::path packages = {};
   std::filesystem::path installed = "/var/lib/dpkg/status";
+  std::filesystem::path release = "/etc/os-release";
 };
 
 /// The result of one test.

@@ -256,7 +256,7 @@ class Comparison final : public session::FrameSink {
     ++images_;
     const double at_s = seconds_of(painted.shown_at);
     if (session::pose_log(painted) != recording_->painted().poses && ++other_poses_ == 1) first_pose_ = at_s;
-    const std::string print = fmt::format("{:016x}", session::fingerprint(painted.eye_images()));
+    const Json print = fmt::format("{:016x}", session::fingerprint(painted.eye_images()));
     if (print != recording_->painted().images && ++other_images_ == 1) first_image_ = at_s;
     return {};
   }

@@ -1,9 +1,5 @@
 #include "core/cameramodel.h"
 
-extern "C" {
-#include <mrcal/mrcal.h>
-}
-
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -20,6 +16,7 @@ extern "C" {
 #include <vector>
 
 #include "core/file.h"
+#include "core/mrcal.h"
 
 namespace limn {
 namespace {

@@ -1,15 +1,12 @@
 #include "core/lens.h"
 
-extern "C" {
-#include <mrcal/mrcal.h>
-}
-
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "core/mrcal.h"
 #include "core/parallel.h"
 
 namespace limn {

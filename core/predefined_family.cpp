@@ -1,9 +1,9 @@
 #include "core/predefined_family.h"
 
 #include <algorithm>
-#include <opencv2/aruco/dictionary.hpp>
 
 #include "core/names.h"
+#include "core/opencv_markers.h"
 
 namespace limn {
 namespace {

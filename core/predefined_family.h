@@ -9,7 +9,7 @@ namespace limn {
 /// A marker family from OpenCV's predefined dictionaries.
 struct PredefinedFamily {
   std::string_view name;  ///< OpenCV's name in lower case: `aruco_4x4_50`, `apriltag_36h11`.
-  int opencv_dictionary;  ///< OpenCV's number, cv::aruco::PREDEFINED_DICTIONARY_NAME.
+  int opencv_dictionary;  ///< OpenCV's number, cv::aruco::DICT_…; for opencv_dictionary().
 };
 
 /// All predefined families.

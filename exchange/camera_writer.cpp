@@ -74,9 +74,10 @@ std::optional<std::vector<double>> opencv_coefficients(const Lens& lens) {
   const std::string& model = lens.model.name();
   const bool is_opencv = model == "LENSMODEL_PINHOLE" || model.starts_with("LENSMODEL_OPENCV");
   if (!is_opencv) return std::nullopt;
-  std::vector<double> coefficients(lens.values.begin() + 4, lens.values.end());
-  while (!coefficients.empty() && coefficients.back() == 0) coefficients.pop_back();
-  return coefficients;
+  std::span<const double> coefficients = std::span(lens.values).subspan(4);
+  while (!coefficients.empty() && coefficients.back() == 0)
+    coefficients = coefficients.first(coefficients.size() - 1);
+  return std::vector<double>(coefficients.begin(), coefficients.end());
 }
 
 // A number that YAML readers take as one: PyYAML takes 1e-05 as a text.

@@ -1,7 +1,5 @@
 #include "sim/ray_scene.h"
 
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +7,7 @@
 #include <new>
 
 #include "core/result.h"
+#include "sim/embree.h"
 #include "sim/texture.h"
 
 namespace limn::sim {
@@ -146,13 +145,11 @@ Hit RayScene::first_hit(const Ray& ray) const {
   constexpr int k_most_cut_out = 64;  // number of cut-out layers that a ray passes
   float from = 0;
   for (int layer = 0; layer < k_most_cut_out; ++layer) {
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
     RTCRayHit query{};
     query.ray = ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), from,
                             std::numeric_limits<float>::infinity());
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(impl_->scene, &context, &query);
+    embree::intersect(impl_->scene, query);
     const Hit hit = impl_->completed(query, ray.p_origin, ray.d);
     if (hit.object < 0) return hit;
     const scene::Mesh& mesh = *impl_->placed[static_cast<std::size_t>(hit.object)].mesh;
@@ -165,9 +162,6 @@ Hit RayScene::first_hit(const Ray& ray) const {
 void RayScene::first_hits(const Eigen::Vector3d& p_origin,
                           std::span<const Eigen::Vector3f> d,
                           std::span<Hit> hits) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   const Eigen::Vector3f from = p_origin.cast<float>();
   std::vector<RTCRayHit> queries(d.size());
   for (std::size_t i = 0; i < d.size(); ++i) {
@@ -176,8 +170,7 @@ void RayScene::first_hits(const Eigen::Vector3d& p_origin,
                                  usable ? std::numeric_limits<float>::infinity() : -1.0F);
     queries[i].hit.geomID = RTC_INVALID_GEOMETRY_ID;
   }
-  rtcIntersect1M(impl_->scene, &context, queries.data(), static_cast<unsigned>(queries.size()),
-                 sizeof(RTCRayHit));
+  embree::intersect_coherent(impl_->scene, queries);
   for (std::size_t i = 0; i < d.size(); ++i)
     hits[i] = impl_->completed(queries[i], p_origin, d[i].cast<double>());
 }
@@ -185,9 +178,6 @@ void RayScene::first_hits(const Eigen::Vector3d& p_origin,
 void RayScene::reached(const Eigen::Vector3d& p_light,
                        std::span<const Eigen::Vector3f> p,
                        std::span<std::uint8_t> reached) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
   const Eigen::Vector3f from = p_light.cast<float>();
   std::vector<RTCRay> queries(p.size());
   for (std::size_t i = 0; i < p.size(); ++i) {
@@ -197,9 +187,7 @@ void RayScene::reached(const Eigen::Vector3d& p_light,
     queries[i] = ray_between(from, usable ? Eigen::Vector3f(towards / distance) : Eigen::Vector3f::UnitZ(), 0,
                              usable ? distance - static_cast<float>(k_surface_gap) : -1.0F);
   }
-  rtcOccluded1M(impl_->scene, &context, queries.data(), static_cast<unsigned>(queries.size()),
-                sizeof(RTCRay));
-  // Embree sets tfar to -infinity where the ray is blocked.
+  embree::occlude_coherent(impl_->scene, queries);
   for (std::size_t i = 0; i < p.size(); ++i) reached[i] = queries[i].tfar >= 0 ? 1 : 0;
 }
 

@@ -2,12 +2,19 @@
 
 say() { printf '%s\n' "limn: $*" >&2; }
 
+# packages_of LIST...: prints the names in the lists. A line "NAME [RELEASE]" counts only on that release of Debian.
+packages_of() {
+  local release
+  release="$(. "${OS_RELEASE:-/etc/os-release}" && printf '%s' "${VERSION_CODENAME:-}")"
+  cat "$@" | sed "s/#.*//; s/\[$release\]//; /\[/d; s/[[:space:]]//g; /^$/d"
+}
+
 # install_packages LIST...
 install_packages() {
   local wanted missing=() runner=()
-  mapfile -t wanted < <(cat "$@" | sed 's/#.*//; /^[[:space:]]*$/d')
+  mapfile -t wanted < <(packages_of "$@")
   if ! command -v dpkg-query >/dev/null; then
-    say "expected a Debian 12 system with apt, found no dpkg-query. Install the equivalents of packages.txt by hand."
+    say "expected Debian 12 or 13 with apt, found no dpkg-query. Install the equivalents of packages.txt by hand."
     return 0
   fi
   for package in "${wanted[@]}"; do
@@ -16,7 +23,8 @@ install_packages() {
   [ ${#missing[@]} -eq 0 ] && return 0
   if [ "$(id -u)" -ne 0 ]; then
     if ! command -v sudo >/dev/null; then
-      say "these Debian packages are missing, and there is no sudo to install them. Run as root: apt-get install ${missing[*]}"
+      say "these Debian packages are missing, and there is no sudo to install them. Run as root:" \
+        "apt-get install --no-install-recommends --no-remove ${missing[*]}"
       return 1
     fi
     runner=(sudo)
@@ -25,14 +33,26 @@ install_packages() {
   local log
   log="$(mktemp)"
   if "${runner[@]}" apt-get update -qq >"$log" 2>&1 &&
-    "${runner[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends --no-remove \
-      "${missing[@]}" >>"$log" 2>&1; then
+    "${runner[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends --no-remove \
+      "${missing[@]}" 2>&1 | show_steps >>"$log" && [ "${PIPESTATUS[0]}" -eq 0 ]; then
     rm -f "$log"
     return 0
   fi
   tail -n 20 "$log" >&2
   say "apt-get could not install the packages above. Complete log: $log"
   return 1
+}
+
+# Copies apt-get's output, and prints what it does every ten seconds.
+show_steps() {
+  local line begun=$SECONDS last=$SECONDS
+  while IFS= read -r line; do
+    printf '%s\n' "$line"
+    if [[ $line =~ ^(Get:|Unpacking|Setting) ]] && ((SECONDS - last >= 10)); then
+      last=$SECONDS
+      say "installing packages ($((SECONDS - begun)) s): ${line:0:80}"
+    fi
+  done
 }
 
 # Copies ninja's output, and prints its progress "[12/345]" every few seconds.

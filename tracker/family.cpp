@@ -8,7 +8,6 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <opencv2/aruco/dictionary.hpp>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <set>
@@ -19,6 +18,7 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/opencv_file.h"
+#include "core/opencv_markers.h"
 #include "core/predefined_family.h"
 #include "tracker/apriltag_codes.h"
 #include "tracker/aruco_mip.h"
@@ -134,11 +134,11 @@ CodeFamily empty_family(const std::string& name, int cells) {
 }
 
 CodeFamily from_opencv(const std::string& name, int index) {
-  const cv::Ptr<cv::aruco::Dictionary> dictionary = cv::aruco::getPredefinedDictionary(index);
-  CodeFamily family = empty_family(name, dictionary->markerSize);
-  for (int id = 0; id < dictionary->bytesList.rows; ++id) {
+  const cv::aruco::Dictionary dictionary = opencv_dictionary(index);
+  CodeFamily family = empty_family(name, dictionary.markerSize);
+  for (int id = 0; id < dictionary.bytesList.rows; ++id) {
     const cv::Mat bits =
-        cv::aruco::Dictionary::getBitsFromByteList(dictionary->bytesList.rowRange(id, id + 1), family.cells);
+        cv::aruco::Dictionary::getBitsFromByteList(dictionary.bytesList.rowRange(id, id + 1), family.cells);
     std::uint64_t code = 0;
     for (int row = 0; row < family.cells; ++row)
       for (int column = 0; column < family.cells; ++column)

@@ -1,15 +1,15 @@
 #pragma once
 
-#include <opencv2/aruco/dictionary.hpp>
 #include <optional>
 
 #include "calib/board/board.h"
+#include "core/opencv_markers.h"
 
 namespace limn::calib {
 
 /// OpenCV's table of a board's markers. For use in this folder only, because it needs OpenCV's
 /// headers.
-cv::Ptr<cv::aruco::Dictionary> dictionary_of(const Board& board);
+cv::aruco::Dictionary dictionary_of(const Board& board);
 
 /// Width of the border of an AprilGrid's tags, in cells.
 constexpr int k_aprilgrid_border = 2;

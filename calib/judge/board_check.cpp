@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <map>
-#include <opencv2/aruco.hpp>
 #include <opencv2/calib3d.hpp>
 
 #include "calib/code/decode.h"
 #include "core/log.h"
+#include "core/opencv_markers.h"
 #include "core/predefined_family.h"
 
 namespace limn::calib {
@@ -27,9 +27,7 @@ struct Marker {
 };
 
 std::vector<Marker> markers_of(const cv::Mat& grey, int dictionary) {
-  std::vector<std::vector<cv::Point2f>> quads;
-  std::vector<int> ids;
-  cv::aruco::detectMarkers(grey, cv::aruco::getPredefinedDictionary(dictionary), quads, ids);
+  const auto [quads, ids] = find_opencv_markers(grey, opencv_dictionary(dictionary));
   std::vector<Marker> markers;
   for (size_t i = 0; i < ids.size(); ++i)
     markers.push_back({ids[i], (quads[i][0] + quads[i][1] + quads[i][2] + quads[i][3]) / 4});

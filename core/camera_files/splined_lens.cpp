@@ -1,14 +1,12 @@
 #include "core/camera_files/splined_lens.h"
 
-extern "C" {
-#include <mrcal/mrcal.h>
-}
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
+
+#include "core/mrcal.h"
 
 namespace limn {
 namespace {

@@ -89,6 +89,18 @@ TEST(Doctor, MissingPackagesAreNamed) {
   EXPECT_EQ(elsewhere.state, State::note);
 }
 
+TEST(Doctor, APackageOfAnotherReleaseIsNotMissing) {
+  const fs::path folder = test::test_folder();
+  ASSERT_TRUE(write_file(folder / "packages.txt", "bread [bookworm]\nrolls [trixie] # since 2025\nbutter\n"));
+  ASSERT_TRUE(write_file(folder / "status", "Package: butter\nStatus: install ok installed\n"));
+  ASSERT_TRUE(write_file(folder / "os-release", "ID=debian\nVERSION_CODENAME=trixie\n"));
+  const auto missing = found(examined({.packages = folder / "packages.txt",
+                                       .installed = folder / "status",
+                                       .release = folder / "os-release"}),
+                             "packages");
+  EXPECT_EQ(missing.text, "missing: rolls");
+}
+
 TEST(Doctor, DevicesThatWorkAreOpenedAndMeasured) {
   test::LoopbackServer server(stream);
   const fs::path file = devices_file(

@@ -10,7 +10,6 @@
 #include <chrono>
 #include <filesystem>
 #include <map>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -210,12 +209,12 @@ struct View {
 // ChArUco corners as OpenCV finds them, then refined in the image, because its interpolation is half a pixel
 // off.
 std::map<int, cv::Point2f> opencv_corners(const calib::Board& board, const cv::Mat& white) {
-  const cv::Ptr<cv::aruco::CharucoBoard> charuco = cv::aruco::CharucoBoard::create(
-      board.columns, board.rows, static_cast<float>(board.square_m),
-      static_cast<float>(board.square_m * board.marker_share), calib::dictionary_of(board));
-  std::vector<std::vector<cv::Point2f>> markers;
-  std::vector<int> ids, corner_ids;
-  cv::aruco::detectMarkers(white, charuco->dictionary, markers, ids);
+  const cv::aruco::Dictionary dictionary = calib::dictionary_of(board);
+  const auto charuco =
+      opencv_charuco_board({board.columns, board.rows}, static_cast<float>(board.square_m),
+                           static_cast<float>(board.square_m * board.marker_share), dictionary);
+  const auto [markers, ids] = find_opencv_markers(white, dictionary);
+  std::vector<int> corner_ids;
   std::vector<cv::Point2f> corners;
   if (!ids.empty()) cv::aruco::interpolateCornersCharuco(markers, ids, white, charuco, corners, corner_ids);
   if (corners.empty()) return {};

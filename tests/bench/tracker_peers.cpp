@@ -1,8 +1,8 @@
 #include "tests/bench/tracker_peers.h"
 
 #include <memory>
-#include <opencv2/aruco.hpp>
 
+#include "core/opencv_markers.h"
 #include "core/predefined_family.h"
 #include "tracker/detector.h"
 
@@ -87,17 +87,14 @@ Peer apriltag_peer(std::span<const std::string> families, float decimate, int th
 }
 
 Peer opencv_peer(std::span<const std::string> families) {
-  const auto parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  cv::aruco::DetectorParameters parameters;
+  parameters.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
   const std::vector<std::string> names(families.begin(), families.end());
   return {"OpenCV", [names, parameters](const cv::Mat& grey, const Lens*) {
             std::vector<Found> found;
             for (const std::string& name : names) {
-              const auto dictionary =
-                  cv::aruco::getPredefinedDictionary(find_predefined_family(name)->opencv_dictionary);
-              std::vector<std::vector<cv::Point2f>> corners;
-              std::vector<int> ids;
-              cv::aruco::detectMarkers(grey, dictionary, corners, ids, parameters);
+              const auto [corners, ids] = find_opencv_markers(
+                  grey, opencv_dictionary(find_predefined_family(name)->opencv_dictionary), parameters);
               for (std::size_t i = 0; i < ids.size(); ++i) {
                 Found f{{name, std::to_string(ids[i])}, {}, unstated()};
                 for (std::size_t k = 0; k < 4; ++k) f.corners_px[k] = {corners[i][k].x, corners[i][k].y};

@@ -2,16 +2,13 @@
 
 // mrcal's own optimiser on the corners that one camera sees: an independent check of calib/solve's camera.
 
-extern "C" {
-#include <mrcal/mrcal.h>
-}
-
 #include <Eigen/Core>
 #include <map>
 #include <vector>
 
 #include "calib/observations.h"
 #include "core/imager.h"
+#include "core/mrcal.h"
 #include "core/pose.h"
 
 namespace limn::calib::worlds {
