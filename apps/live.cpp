@@ -350,16 +350,6 @@ session::SessionDevices opened(const device::Devices& devices, const Rig& rig, d
   return out;
 }
 
-// Ends with black: what a desktop shows below may be bright. A display that fails has no light anyway.
-void darken(const session::SessionDevices& devices) {
-  const auto darken_all = [](const auto& displays) {
-    for (const auto& display : displays)
-      if (display) static_cast<void>(display->show(cv::Mat::zeros(display->size(), CV_8UC1)));
-  };
-  darken_all(devices.projectors);
-  darken_all(devices.screens);
-}
-
 Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(const device::Devices named, device::load_devices(options.devices));
   LIMN_TRY(const std::vector<FileLock> locks, lock_devices(named));

@@ -76,4 +76,13 @@ Result<std::vector<FileLock>> lock_devices(const device::Devices& devices) {
   return locks;
 }
 
+void darken(const session::SessionDevices& devices) {
+  const auto darken_all = [](const auto& displays) {
+    for (const auto& display : displays)
+      if (display) static_cast<void>(display->show(cv::Mat::zeros(display->size(), CV_8UC1)));
+  };
+  darken_all(devices.projectors);
+  darken_all(devices.screens);
+}
+
 }  // namespace limn::apps

@@ -5,6 +5,7 @@
 #include "core/file_lock.h"
 #include "core/service_notifier.h"
 #include "device/devices_file.h"
+#include "session/device_session.h"
 #include "session/session_client.h"
 
 namespace limn::apps {
@@ -33,5 +34,9 @@ class LiveService : public session::SessionClient {
 /// Locks the devices file and this machine's monitors in it, so that no second session shows on them. The
 /// locks are in $XDG_RUNTIME_DIR/limn, else in a folder for temporary files. Error: a session uses one.
 Result<std::vector<FileLock>> lock_devices(const device::Devices& devices);
+
+/// Every open display becomes black, for the end of a session: what the desktop shows below may be bright. A
+/// display that fails has no light anyway.
+void darken(const session::SessionDevices& devices);
 
 }  // namespace limn::apps

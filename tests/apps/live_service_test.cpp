@@ -1,4 +1,6 @@
 // The program as a service: the test plays the service manager.
+#include "apps/live_service.h"
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -12,11 +14,14 @@
 #include <array>
 #include <csignal>
 #include <cstring>
+#include <memory>
+#include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
 #include "core/file.h"
 #include "core/frame.h"
+#include "device/offscreen_display.h"
 #include "tests/support/matchers.h"
 #include "tests/support/text.h"
 
@@ -139,6 +144,36 @@ TEST(LiveService, IsBackWithLightAfterItWasKilled) {
   EXPECT_EQ(manager.stop(SIGTERM), 0);
   EXPECT_TRUE(manager.receives("STOPPING=1", 1));
   test::expect_contains(manager.journal(), "<6>live: ");
+}
+
+TEST(LiveService, EndsWithBlackOnEveryDisplay) {
+  session::SessionDevices devices;
+  auto projector = std::make_unique<device::OffscreenDisplay>("projector0", cv::Size(4, 3));
+  const device::OffscreenDisplay& shown = *projector;
+  ASSERT_TRUE(projector->show(cv::Mat(3, 4, CV_8UC3, cv::Scalar::all(200))));
+  devices.projectors.push_back(nullptr);  // one that could not be opened
+  devices.projectors.push_back(std::move(projector));
+  apps::darken(devices);
+  ASSERT_FALSE(shown.image().empty());
+  EXPECT_EQ(cv::norm(shown.image(), cv::NORM_INF), 0);
+}
+
+TEST(LiveService, IsNotStartedTwiceOnTheSameDevicesOrMonitor) {
+  const fs::path folder = test::test_folder();
+  setenv("XDG_RUNTIME_DIR", folder.c_str(), 1);
+  device::Devices one{.file = folder / "one.json"}, other{.file = folder / "other.json"};
+  one.displays.push_back({.name = "projector0", .monitor = "HDMI-1"});
+  other.displays.push_back({.name = "left", .monitor = "HDMI-1"});
+  const auto locks = apps::lock_devices(one);
+  ASSERT_TRUE(locks) << locks.message();
+  const auto again = apps::lock_devices(one), same_monitor = apps::lock_devices(other);
+  ASSERT_FALSE(again);
+  test::expect_contains(again.message(), "one.json: expected to use it alone, found that process");
+  ASSERT_FALSE(same_monitor);
+  test::expect_contains(same_monitor.message(),
+                        "other.json: displays: the monitor HDMI-1: expected to use it");
+  other.displays[0].monitor = "HDMI-2";
+  EXPECT_TRUE(apps::lock_devices(other));
 }
 
 }  // namespace
