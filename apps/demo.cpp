@@ -21,7 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Status write_results(const fs::path& out, const validate::DemoResult& result) {
+Status write_results(const fs::path& out, const validate::DemoResult& result, const std::string& renderer) {
   for (const validate::DemoImage& image : result.images) {
     LIMN_TRY_STATUS(write_png(out / (image.file + ".png"), image.image));
   }
@@ -30,7 +30,8 @@ Status write_results(const fs::path& out, const validate::DemoResult& result) {
       "A whole session on a virtual rig whose ground truth is known. Two projectors and a camera were "
       "calibrated from simulated captures, the markers were found in a simulated photograph, the parts were "
       "projected onto the door, and a ray tracer that shares no code with the renderer measured where the "
-      "light fell.",
+      "light fell. Drawn by " +
+          renderer + ".",
       result.rows, result.images};
   return validate::write_demo_page(page, out / "demo.html");
 }
@@ -59,8 +60,9 @@ Status run_demo(const DemoOptions& options) {
     LIMN_TRY(window, device::Window::open("Limn demo", 1280, 720));
   }
   LIMN_TRY(const validate::DemoResult result, validate::play_demo(options.out, options.keep_captures));
-  LIMN_TRY_STATUS(write_results(options.out, result));
-  print_out("{}\n{}\n", validate::text_table(result.rows), (options.out / "demo.html").string());
+  LIMN_TRY_STATUS(write_results(options.out, result, gl.description()));
+  print_out("{}\nDrawn by {}.\n{}\n", validate::text_table(result.rows), gl.description(),
+            (options.out / "demo.html").string());
   std::fflush(stdout);
   if (window) show_in(*window, result.images);
   return {};

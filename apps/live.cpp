@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 
+#include "apps/live_service.h"
 #include "core/data_folder.h"
 #include "core/log.h"
 #include "core/names.h"
@@ -274,7 +275,10 @@ Status run_session(const LiveOptions& options,
   if (server) parts.clients.push_back(server.get());
   if (console) parts.clients.push_back(&*console);
   if (room) parts.clients.push_back(room);
+  LiveService service;
+  parts.clients.push_back(&service);
   LIMN_TRY_STATUS(play(parts, console ? &console->keys() : nullptr));
+  service.stop();
   console.reset();
   if (server) server->stop();
   return output.close(&session, options.json);
@@ -359,6 +363,7 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(setup.rig, load_rig(options.rig));
   LIMN_TRY(const device::Devices named, options.devices.empty() ? devices_in_room(options.room, setup.rig)
                                                                 : device::load_devices(options.devices));
+  LIMN_TRY(const std::vector<FileLock> locks, lock_devices(named));
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));
@@ -384,15 +389,19 @@ Status play_with_devices(const LiveOptions& options) {
   }
   nodes::RoomOpener opener(room ? room->room() : nullptr, desktop ? &*desktop : nullptr, setup.screens);
   session::SessionDevices open = opened(devices, setup.rig, &opener);
-  return run_session(options, setup, skipped_variants, desktop ? &*desktop : nullptr,
-                     room ? room->client() : nullptr,
-                     [&](const session::SessionParts& parts, session::Keys* keys) {
-                       open.chosen = keys;
-                       return session::play_on_devices(&open, options.seconds, g_is_ended, parts);
-                     });
+  return run_session(
+      options, setup, skipped_variants, desktop ? &*desktop : nullptr, room ? room->client() : nullptr,
+      [&](const session::SessionParts& parts, session::Keys* keys) {
+        open.chosen = keys;
+        const Status played = session::play_on_devices(&open, options.seconds, g_is_ended, parts);
+        darken(open);
+        return played;
+      });
 }
 
 }  // namespace
+
+bool live_was_ended_by_signal() { return g_is_ended; }
 
 Status run_live(const LiveOptions& options) {
   LIMN_TRY_STATUS(check_options(options));

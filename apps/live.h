@@ -50,4 +50,7 @@ struct LiveOptions {
 /// writes poses.csv, telemetry.csv, session.json, session.html and the last images. Prints the measurements.
 Status run_live(const LiveOptions& options);
 
+/// Whether a signal has ended the newest session of run_live().
+bool live_was_ended_by_signal();
+
 }  // namespace limn::apps

@@ -1,11 +1,15 @@
 #include "core/log.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <mutex>
+
+#include "core/log_error.h"
 
 namespace limn {
 namespace {
@@ -21,6 +25,21 @@ constexpr double k_silent_s = 1;  // shorter work shows no progress (docs/format
 constexpr double k_terminal_every_s = 0.1;
 constexpr double k_file_every_s = 5;
 
+// Whether stderr goes to systemd's journal: JOURNAL_STREAM names its device and inode.
+bool is_journal() {
+  const char* const named = std::getenv("JOURNAL_STREAM");
+  struct stat found {};
+  return named && fstat(STDERR_FILENO, &found) == 0 &&
+         fmt::format("{}:{}", found.st_dev, found.st_ino) == named;
+}
+
+// The journal reads a line's level from its start (sd-daemon(3)); people get no prefix.
+std::string journal_prefix(int level) {
+  static const bool is_needed = is_journal();
+  return is_needed ? fmt::format("<{}>", level) : "";
+}
+constexpr int k_journal_error = 3, k_journal_warning = 4, k_journal_info = 6;
+
 // A line that cannot be written (full disk, closed pipe) is lost, because there is no other way to report it.
 void write_line(const std::string& text) {
   const std::lock_guard lock(g_stderr);
@@ -33,7 +52,12 @@ void set_log_level(LogLevel level) { g_level = level; }
 
 void log_line(LogLevel level, const std::string& line) {
   if (level > g_level.load()) return;
-  write_line(line + "\n");
+  write_line(journal_prefix(level == LogLevel::warning ? k_journal_warning : k_journal_info) + line + "\n");
+}
+
+void log_error_line(const std::string& line) {
+  if (g_level.load() == LogLevel::quiet) return;
+  write_line(journal_prefix(k_journal_error) + line + "\n");
 }
 
 Progress::Progress(std::string what, int total)
@@ -46,15 +70,17 @@ void Progress::step(int done) {
   const double every = terminal ? k_terminal_every_s : k_file_every_s;
   if (g_level.load() < LogLevel::info || now - started_s_ < k_silent_s || now - printed_s_ < every) return;
   printed_s_ = now;
-  write_line(fmt::format("{}{} {}/{} ({:.0f} s){}", terminal ? "\r\033[K" : "", what_, done_, total_,
-                         now - started_s_, terminal ? "" : "\n"));
+  write_line(fmt::format("{}{} {}/{} ({:.0f} s){}",
+                         terminal ? std::string("\r\033[K") : journal_prefix(k_journal_info), what_, done_,
+                         total_, now - started_s_, terminal ? "" : "\n"));
 }
 
 Progress::~Progress() {
   const double seconds = now_s() - started_s_;
   if (g_level.load() < LogLevel::info || seconds < k_silent_s) return;
-  write_line(fmt::format("{}{} {}/{} ({:.1f} s)\n", isatty(STDERR_FILENO) ? "\r\033[K" : "", what_, done_,
-                         total_, seconds));
+  write_line(fmt::format("{}{} {}/{} ({:.1f} s)\n",
+                         isatty(STDERR_FILENO) ? std::string("\r\033[K") : journal_prefix(k_journal_info),
+                         what_, done_, total_, seconds));
 }
 
 }  // namespace limn

@@ -11,6 +11,10 @@ install(FILES ${install_files}/io.github.limn.metainfo.xml
 install(FILES ${PROJECT_SOURCE_DIR}/remote/web/icon.svg RENAME limn.svg
   DESTINATION ${CMAKE_INSTALL_DATADIR}/icons/hicolor/scalable/apps COMPONENT program)
 install(FILES ${install_files}/70-limn.rules DESTINATION lib/udev/rules.d COMPONENT program)
+# systemd needs the program's whole path, which is known when it is installed.
+install(CODE "set(program \"\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_BINDIR}/limn\")
+  configure_file(\"${install_files}/limn-live.service.in\"
+    \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/lib/systemd/user/limn-live.service\" @ONLY)" COMPONENT program)
 
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/config DESTINATION ${data} COMPONENT data PATTERN "README.md" EXCLUDE)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/remote/web DESTINATION ${data}/remote COMPONENT data

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "apps/room.h"
-#include "core/log.h"
+#include "core/log_error.h"
 #include "core/names.h"
 
 namespace limn::apps {
@@ -23,7 +23,7 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
 
 int report_result(const Status& status) {
   if (status) return 0;
-  log_warning("limn: {}", status.message());
+  log_error_line("limn: " + status.message());
   return status.error().wrong_usage ? 2 : 1;
 }
 

@@ -7,6 +7,7 @@
 #include "apps/commands/options.h"
 #include "apps/demo.h"
 #include "apps/doctor.h"
+#include "apps/hardware_report/report.h"
 #include "apps/live.h"
 #include "apps/replay.h"
 #include "apps/room.h"
@@ -257,8 +258,10 @@ void add_doctor(CLI::App& app, Run& run) {
       "work.\n"
       "Example: limn doctor --show 10\n"
       "Example: limn doctor --devices config/devices/studio.json --rig rig\n"
-      "Example: limn doctor --room studio");
+      "Example: limn doctor --room studio\n"
+      "Example: limn doctor --report report   (docs/hardware-report.md)");
   auto options = std::make_shared<DoctorOptions>();
+  auto report = std::make_shared<ReportOptions>();
   command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed")
       ->type_name("ROOM");
   add_room_options(command, &options->room);
@@ -273,7 +276,33 @@ void add_doctor(CLI::App& app, Run& run) {
           "How long each output shows its own number and colour, in seconds (without it: not at all)")
       ->check(CLI::Range(0.0, 3600.0));
   command->add_flag("--json", options->json, "Print JSON instead of lines");
-  command->callback([options, &run] { run = [options] { return report_result(run_doctor(*options)); }; });
+  auto* folder =
+      command
+          ->add_option(
+              "--report", report->folder,
+              "Measure camera, projector and a live session for about half an hour, and write all of "
+              "it into one folder; the same command goes on after an interruption")
+          ->type_name("FOLDER");
+  command->add_option("--board", report->board, "With --report: the board that you hold into the light")
+      ->type_name("BOARD")
+      ->capture_default_str()
+      ->needs(folder);
+  command->add_option("--live-seconds", report->live_s, "With --report: length of the recorded session")
+      ->check(CLI::Range(1.0, 3600.0))
+      ->capture_default_str()
+      ->needs(folder);
+  command
+      ->add_flag("--with-names", report->with_names,
+                 "With --report: keep names, addresses and serial numbers in it")
+      ->needs(folder);
+  command->callback([options, report, &run] {
+    run = [options, report] {
+      if (report->folder.empty()) return report_result(run_doctor(*options));
+      report->devices = options->devices;
+      report->rig = options->rig;
+      return report_result(run_hardware_report(*report));
+    };
+  });
 }
 
 }  // namespace limn::apps

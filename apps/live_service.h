@@ -1,0 +1,42 @@
+#pragma once
+
+#include <vector>
+
+#include "core/file_lock.h"
+#include "core/service_notifier.h"
+#include "device/devices_file.h"
+#include "session/device_session.h"
+#include "session/session_client.h"
+
+namespace limn::apps {
+
+/// Reports a session to the service manager: READY=1 after its first frame, WATCHDOG=1 from the frame loop (a
+/// loop that hangs sends none, and the manager starts the program again), STATUS=, and STOPPING=1 at the end.
+class LiveService : public session::SessionClient {
+ public:
+  LiveService() : notifier_(ServiceNotifier::from_environment()) {}
+
+  void apply_edits(const session::SessionMoment& moment) override;
+  void publish_state(const session::SessionMoment& moment) override;
+  /// The loop has ended; files are still being written.
+  void stop() const { notifier_.send("STOPPING=1"); }
+
+ private:
+  void report_status();
+
+  ServiceNotifier notifier_;
+  Stamp alive_at_;   // when WATCHDOG=1 was sent last
+  Stamp status_at_;  // when STATUS= was sent last
+  int frames_ = 0;   // shown since then
+  bool is_ready_ = false;
+};
+
+/// Locks the devices file and this machine's monitors in it, so that no second session shows on them. The
+/// locks are in $XDG_RUNTIME_DIR/limn, else in a folder for temporary files. Error: a session uses one.
+Result<std::vector<FileLock>> lock_devices(const device::Devices& devices);
+
+/// Every open display becomes black, for the end of a session: what the desktop shows below may be bright. A
+/// display that fails has no light anyway.
+void darken(const session::SessionDevices& devices);
+
+}  // namespace limn::apps
