@@ -18,6 +18,7 @@
 #include "core/screen_encoding.h"
 #include "core/user_folder.h"
 #include "device/desktop.h"
+#include "device/device_locks.h"
 #include "device/device_opener.h"
 #include "device/devices_file.h"
 #include "device/gl_context.h"
@@ -363,7 +364,7 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(setup.rig, load_rig(options.rig));
   LIMN_TRY(const device::Devices named, options.devices.empty() ? devices_in_room(options.room, setup.rig)
                                                                 : device::load_devices(options.devices));
-  LIMN_TRY(const std::vector<FileLock> locks, lock_devices(named));
+  LIMN_TRY(const std::vector<FileLock> locks, device::lock_devices(named));
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));

@@ -1,32 +1,11 @@
 #include "apps/live_service.h"
 
-#include <unistd.h>
-
-#include <algorithm>
-#include <cctype>
-#include <cstdlib>
-
 #include "core/frame.h"
 
 namespace limn::apps {
 namespace {
 
-namespace fs = std::filesystem;
-
 constexpr double k_status_every_s = 5;
-
-fs::path lock_folder() {
-  const char* const runtime = std::getenv("XDG_RUNTIME_DIR");
-  if (runtime && fs::path(runtime).is_absolute()) return fs::path(runtime) / "limn";
-  return fs::temp_directory_path() / fmt::format("limn-{}", getuid());
-}
-
-// Other characters become "_", so that the name is a file's name.
-std::string file_name(std::string name) {
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return !std::isalnum(c) && c != '-' && c != '.'; }, '_');
-  return name + ".lock";
-}
 
 }  // namespace
 
@@ -54,26 +33,6 @@ void LiveService::report_status() {
                                        : fmt::format("STATUS={:.1f} frames per second", frames_ / since_s));
   status_at_ = at;
   frames_ = 0;
-}
-
-Result<std::vector<FileLock>> lock_devices(const device::Devices& devices) {
-  const fs::path folder = lock_folder();
-  std::error_code no_path;
-  const fs::path file = fs::weakly_canonical(devices.file, no_path);
-  std::vector<FileLock> locks;
-  LIMN_TRY(FileLock of_file,
-           FileLock::acquire(folder / file_name("devices" + file.string()), devices.file.string()));
-  locks.push_back(std::move(of_file));
-  const char* const desktop = std::getenv("DISPLAY");
-  for (const device::DisplayConfig& display : devices.displays) {
-    if (!display.host.empty() || display.kind != device::DisplayKind::monitor) continue;
-    const std::string name = fmt::format("monitor{}-{}", desktop ? desktop : "", display.monitor);
-    LIMN_TRY(FileLock of_monitor, FileLock::acquire(folder / file_name(name),
-                                                    fmt::format("{}: displays: the monitor {}",
-                                                                devices.file.string(), display.monitor)));
-    locks.push_back(std::move(of_monitor));
-  }
-  return locks;
 }
 
 void darken(const session::SessionDevices& devices) {

@@ -1,10 +1,6 @@
 #pragma once
 
-#include <vector>
-
-#include "core/file_lock.h"
 #include "core/service_notifier.h"
-#include "device/devices_file.h"
 #include "session/device_session.h"
 #include "session/session_client.h"
 
@@ -30,10 +26,6 @@ class LiveService : public session::SessionClient {
   int frames_ = 0;   // shown since then
   bool is_ready_ = false;
 };
-
-/// Locks the devices file and this machine's monitors in it, so that no second session shows on them. The
-/// locks are in $XDG_RUNTIME_DIR/limn, else in a folder for temporary files. Error: a session uses one.
-Result<std::vector<FileLock>> lock_devices(const device::Devices& devices);
 
 /// Every open display becomes black, for the end of a session: what the desktop shows below may be bright. A
 /// display that fails has no light anyway.

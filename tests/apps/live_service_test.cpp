@@ -21,6 +21,7 @@
 
 #include "core/file.h"
 #include "core/frame.h"
+#include "device/device_locks.h"
 #include "device/offscreen_display.h"
 #include "tests/support/matchers.h"
 #include "tests/support/text.h"
@@ -164,16 +165,16 @@ TEST(LiveService, IsNotStartedTwiceOnTheSameDevicesOrMonitor) {
   device::Devices one{.file = folder / "one.json"}, other{.file = folder / "other.json"};
   one.displays.push_back({.name = "projector0", .monitor = "HDMI-1"});
   other.displays.push_back({.name = "left", .monitor = "HDMI-1"});
-  const auto locks = apps::lock_devices(one);
+  const auto locks = device::lock_devices(one);
   ASSERT_TRUE(locks) << locks.message();
-  const auto again = apps::lock_devices(one), same_monitor = apps::lock_devices(other);
+  const auto again = device::lock_devices(one), same_monitor = device::lock_devices(other);
   ASSERT_FALSE(again);
   test::expect_contains(again.message(), "one.json: expected to use it alone, found that process");
   ASSERT_FALSE(same_monitor);
   test::expect_contains(same_monitor.message(),
                         "other.json: displays: the monitor HDMI-1: expected to use it");
   other.displays[0].monitor = "HDMI-2";
-  EXPECT_TRUE(apps::lock_devices(other));
+  EXPECT_TRUE(device::lock_devices(other));
 }
 
 }  // namespace

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "core/file_lock.h"
+#include "device/devices_file.h"
+
+namespace limn::device {
+
+/// Locks the devices file and this machine's monitors in it, so that no second session shows on them. The
+/// locks are in $XDG_RUNTIME_DIR/limn, else in a folder for temporary files. Error: a session uses one.
+Result<std::vector<FileLock>> lock_devices(const device::Devices& devices);
+
+}  // namespace limn::device
