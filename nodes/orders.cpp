@@ -10,7 +10,7 @@
 namespace limn::nodes {
 namespace {
 
-constexpr double k_open_limit_s = 8;
+constexpr double k_camera_opens_s = 8;
 constexpr int k_preview_quality = 90;
 constexpr double k_same_s = 1e-3;     // stamps of one image, converted there and back, differ by less
 constexpr double k_grab_limit_s = 4;  // for an image that was exposed after a given moment
@@ -133,7 +133,7 @@ Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock
 Answer carried_out(const Order& order, const std::optional<ClockEstimate>& clock, DetectingCamera* camera) {
   return answer_to(order, [&](Answer* answer) -> Status {
     if (order.what == Order::What::open_camera) {
-      LIMN_TRY(answer->size, camera->size(k_open_limit_s));
+      LIMN_TRY(answer->size, camera->size(k_camera_opens_s));
       return {};
     }
     if (!asks_for_image(order)) return unknown(order);

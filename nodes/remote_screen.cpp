@@ -13,8 +13,8 @@ namespace limn::nodes {
 namespace {
 
 constexpr double k_ask_limit_s = 10;
-constexpr double k_shortest_s = 1.0 / 15;  // between two images
-constexpr double k_bytes_a_second = 4e6;   // about a third of a network of 100 Mbit/s
+constexpr double k_shortest_pause_s = 1.0 / 15;  // between two images
+constexpr double k_bytes_a_second = 4e6;         // about a third of a network of 100 Mbit/s
 constexpr int k_jpeg_quality = 85;
 constexpr double k_delay_s = 0.05;  // what encoding, network and decoding mostly take
 
@@ -87,7 +87,7 @@ void RemoteScreen::run() {
     is_sending_ = true;
     lock.unlock();
     const Stamp begun = now();
-    double seconds = k_shortest_s;
+    double seconds = k_shortest_pause_s;
     const Status sent = send(images, &seconds);
     lock.lock();
     is_sending_ = false;
@@ -104,7 +104,7 @@ Status RemoteScreen::send(const EyeImages& images, double* seconds) {
                           .left = jpeg_of(images.left),
                           .right = jpeg_of(images.right)};
   const auto bytes = static_cast<double>(image.left.size() + image.right.size());
-  *seconds = std::max(k_shortest_s, bytes / k_bytes_a_second);
+  *seconds = std::max(k_shortest_pause_s, bytes / k_bytes_a_second);
   return room_->send(image);
 }
 
