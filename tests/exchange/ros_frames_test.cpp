@@ -146,7 +146,9 @@ TEST(RosFrames, ATrackerNamesWhatIsWrongAndGoesOn) {
   EXPECT_EQ(decoder.decoded(std::vector{broken, moving("map", "hand", 10, 1)}).value().size(), 1U);
   EXPECT_TRUE(has(decoder.take_problem(), "'tail': expected a quaternion"));
   for (int i = 0; i < 30; ++i) {
-    if (i < 10) EXPECT_EQ(decoder.take_problem(), "");  // the chain may still come
+    if (i < 10) {
+      EXPECT_EQ(decoder.take_problem(), "");  // the chain may still come
+    }
     EXPECT_EQ(decoder.decoded(std::vector{moving("map", "hand", 11 + i, 1)}).value().size(), 1U);
   }
   EXPECT_TRUE(has(decoder.take_problem(), "between the frames 'map' and 'foot', found a gap"));
