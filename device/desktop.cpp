@@ -43,6 +43,10 @@ Result<Desktop> Desktop::open() {
   if (glfwGetError(nullptr) != GLFW_NOT_INITIALIZED)
     return error(
         "desktop: expected to be the only one in this program, found another. Pass that one on instead.");
+#ifdef GLFW_PLATFORM_X11
+  // Since 3.4 GLFW prefers Wayland, where no program may place its windows on monitors; on X11 it may.
+  glfwInitHint(GLFW_PLATFORM, GLFW_PLATFORM_X11);
+#endif
   if (!glfwInit()) {
     return error("desktop: expected a display, found none ({}). Log in to a desktop or set DISPLAY.",
                  glfw_problem());

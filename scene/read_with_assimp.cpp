@@ -89,14 +89,16 @@ class AssimpReader {
   MeshContent read() {
     read_materials();
     const std::string format = lower_extension(path_);
-    Eigen::Matrix4d file_from_root = Eigen::Matrix4d::Identity();
-    if (format == ".fbx") content_.metres_per_unit = fbx_unit(scene_);
+    Eigen::Matrix4d file_from_root = to_eigen(scene_.mRootNode->mTransformation);
+    if (format == ".fbx") {
+      content_.metres_per_unit = fbx_unit(scene_);
+      file_from_root.setIdentity();  // since version 5.4 assimp turns an FBX's root to axes of its own
+    }
     if (format == ".amf") content_.metres_per_unit = amf_unit(path_);
     if (format == ".gltf" || format == ".glb") content_.metres_per_unit = 1;
     if (format == ".dae") {
       content_.metres_per_unit = collada_unit(path_);
-      file_from_root.topLeftCorner<3, 3>() /=
-          *content_.metres_per_unit;  // assimp has scaled the root to metres
+      file_from_root.topRows<3>() /= *content_.metres_per_unit;  // assimp has scaled the root to metres
     }
     place(*scene_.mRootNode, file_from_root);
     add(*scene_.mRootNode);
@@ -109,10 +111,12 @@ class AssimpReader {
   }
 
  private:
-  void place(const aiNode& node, const Eigen::Matrix4d& file_from_parent) {
-    const Eigen::Matrix4d file_from_node = file_from_parent * to_eigen(node.mTransformation);
+  void place(const aiNode& node, const Eigen::Matrix4d& file_from_node) {
     file_from_node_[&node] = file_from_node;
-    for (unsigned i = 0; i < node.mNumChildren; ++i) place(*node.mChildren[i], file_from_node);
+    for (unsigned i = 0; i < node.mNumChildren; ++i) {
+      const aiNode& child = *node.mChildren[i];
+      place(child, file_from_node * to_eigen(child.mTransformation));
+    }
   }
 
   void add(const aiNode& node) {
