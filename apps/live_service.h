@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/service_notifier.h"
+#include "device/service_notifier.h"
 #include "session/device_session.h"
 #include "session/session_client.h"
 

@@ -86,6 +86,10 @@ void DetectingCamera::run() try {
   }
 } catch (const std::exception& bug) {
   log_warning("node: {}: this is a bug in Limn, please report it: {}", config_.name, bug.what());
+  const std::lock_guard lock(mutex_);
+  problem_ =
+      fmt::format("{}: the search in its images has ended by a bug in Limn: {}", config_.name, bug.what());
+  changed_.notify_all();
 }
 
 bool DetectingCamera::open() {

@@ -15,7 +15,7 @@ namespace limn::nodes {
 
 /// The version of the messages below. Machines with different versions do not work together; each names the
 /// other.
-inline constexpr int k_protocol = 1;
+inline constexpr int k_protocol = 2;
 
 /// Identifies a message's sender: a program that runs on a machine.
 struct Sender {

@@ -123,8 +123,12 @@ class NodeLoop {
     if (!host_ || !setup_ || !load_at_ || now() < *load_at_) return;
     load_at_.reset();
     // A host that was restarted with the same session finds it drawn already.
-    if (frames_ && loader_.is_idle() && drawn_ && has_same_content(*drawn_, *setup_))
-      return frames_->adopt(host_->sender.run, setup_->revision);
+    if (frames_ && loader_.is_idle() && drawn_ && has_same_content(*drawn_, *setup_)) {
+      frames_->adopt(host_->sender.run, setup_->revision);
+      for (CameraTask& task : camera_tasks_) task.search.setup = setup_->revision;
+      cameras_.detect(camera_tasks_);
+      return;
+    }
     loading_ = setup_;
     loader_.load(*setup_, *host_);
   }
@@ -133,9 +137,15 @@ class NodeLoop {
     if (loaded && host_ && loaded->run != host_->sender.run) return;  // its host has gone
     drawn_.reset();
     const std::string problem_before = std::exchange(problem_, {});
-    if (loaded) detect(*loaded);
     frames_.reset();
-    if (loaded) screens_.set_devices(loaded->devices, loaded->session.rig, room_->self().node);
+    if (loaded) {
+      detect(*loaded);
+      screens_.set_devices(loaded->devices, loaded->session.rig, room_->self().node);
+    } else {
+      camera_tasks_.clear();
+      cameras_.detect({});
+      screens_.set_devices({}, {}, room_->self().node);
+    }
     auto frames = loaded ? NodeFrames::create(std::move(*loaded), room_->self().node, &displays_)
                          : Result<std::unique_ptr<NodeFrames>>(loaded.error());
     if (frames) {
@@ -154,15 +164,15 @@ class NodeLoop {
   void detect(const LoadedSetup& loaded) {
     const session::SessionSetup& session = loaded.session;
     const auto wanted = session::camera_detector_setup(session.scene, session.watch.full_scan_every);
-    if (!wanted) return log_warning("node: {}", wanted.message());
-    std::vector<CameraTask> tasks;
+    camera_tasks_.clear();
+    if (!wanted) log_warning("node: {}", wanted.message());
     for (const device::CameraConfig& config : loaded.devices.cameras) {
       const Imager* camera = find_named(session.rig.cameras, config.name);
-      if (config.host == room_->self().node && camera)
-        tasks.push_back(
+      if (wanted && config.host == room_->self().node && camera)
+        camera_tasks_.push_back(
             {config, {loaded.revision, *wanted, *camera, tracker::encoding_of(session.rig, *camera)}});
     }
-    cameras_.detect(std::move(tasks));
+    cameras_.detect(camera_tasks_);
   }
 
   // Orders that come before the clocks are compared wait for that.
@@ -240,10 +250,11 @@ class NodeLoop {
   std::optional<Machine> host_;
   std::deque<WaitingOrder> orders_;
   std::optional<Stamp> waits_since_;
-  std::optional<Setup> setup_;    // the host's last
-  std::optional<Setup> loading_;  // the last one that was given to the loader
-  std::optional<Setup> drawn_;    // that of the frames
-  std::optional<Stamp> load_at_;  // when it is to be loaded
+  std::optional<Setup> setup_;            // the host's last
+  std::optional<Setup> loading_;          // the last one that was given to the loader
+  std::optional<Setup> drawn_;            // that of the frames
+  std::vector<CameraTask> camera_tasks_;  // likewise
+  std::optional<Stamp> load_at_;          // when it is to be loaded
   std::unique_ptr<NodeFrames> frames_;
   std::string problem_;            // why there are no frames
   std::optional<Stamp> shown_at_;  // the last frame

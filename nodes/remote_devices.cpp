@@ -154,15 +154,23 @@ Result<tracker::DetectionSource::Output> RemoteCamera::next_output() {
                config_.limit_s);
 }
 
+void RemoteCamera::want_images(Images images) {
+  const std::lock_guard lock(mutex_);
+  if (images == Images::exact && wanted_images_ != Images::exact) image_.reset();
+  wanted_images_ = images;
+}
+
 void RemoteCamera::ask_for_images(const std::stop_token& stop) {
   Stamp asked_at;
   for (; !stop.stop_requested(); std::this_thread::sleep_for(k_image_pause)) {
     while (!stop.stop_requested() &&
-           (wants_every_image_ || seconds_between(asked_at, now()) >= k_image_every_s)) {
+           (wanted_images_ != Images::some || seconds_between(asked_at, now()) >= k_image_every_s)) {
       asked_at = now();
-      auto image = image_by(wants_every_image_ ? Order::What::grab : Order::What::preview);
+      const bool is_exact = wanted_images_ == Images::exact;
+      auto image = image_by(is_exact ? Order::What::grab : Order::What::preview);
       if (!image) break;
       const std::lock_guard lock(mutex_);
+      if (!is_exact && wanted_images_ == Images::exact) continue;
       image_ = std::move(*image);
     }
   }

@@ -59,7 +59,7 @@ class RemoteCamera final : public device::CameraSource, public tracker::Detectio
   Result<Frame> next() override;
   std::string description() const override { return "at " + config_.host; }
   Result<Output> next_output() override;
-  void want_every_image(bool is_wanted) override { wants_every_image_ = is_wanted; }
+  void want_images(Images images) override;
 
  private:
   RemoteCamera(Room* room, const device::CameraConfig& config) : room_(room), config_(config) {}
@@ -74,7 +74,7 @@ class RemoteCamera final : public device::CameraSource, public tracker::Detectio
   Stamp captured_at_, detected_at_;
   Stamp worked_at_ = now();  // when the last detections came, or an error was returned
   std::string problem_;      // with the last detections
-  std::atomic<bool> wants_every_image_ = false;
+  std::atomic<Images> wanted_images_ = Images::some;
   std::mutex mutex_;
   std::optional<Frame> image_;  // that was not taken
   std::jthread asking_;

@@ -137,6 +137,12 @@ Result<RoomKeys> load_room(const fs::path& folder, RoomRole role) {
   LIMN_TRY_STATUS(check_document(keys.governance, keys.authority, (folder / k_governance).string()));
   LIMN_TRY_STATUS(check_document(keys.permissions, keys.authority, (folder / k_permissions).string()));
   LIMN_TRY_STATUS(check_room_name(identity.name));
+  if (keys.permissions.find("limn_v1_detections") == std::string::npos)
+    return error(
+        "{}: expected the permissions that this version needs, found ones of an earlier version. Run limn "
+        "room "
+        "create again, and copy the new folder to all machines.",
+        (folder / k_permissions).string());
   keys.name = std::move(identity.name);
   keys.certificate = std::move(identity.certificate);
   keys.private_key = std::move(identity.private_key);

@@ -48,8 +48,8 @@ Result<Frame> RosCamera::next_within(double limit_s) {
   const Stamp until = shifted(now(), limit_s);
   std::optional<Result<Frame>> frame;
   fault_.clear();
-  while (
-      feed_->next(until, [&](const RosImage& image, const auto& times) { frame = frame_of(image, times); })) {
+  while (feed_->next(
+      until, [&](const device::RosImage& image, const auto& times) { frame = frame_of(image, times); })) {
     if (frame && *frame) return std::move(*frame);
     ++damaged_;
     fault_ = frame ? frame->message() : "its message could not be read.";
@@ -58,8 +58,8 @@ Result<Frame> RosCamera::next_within(double limit_s) {
                limit_s, why_none());
 }
 
-Result<Frame> RosCamera::frame_of(const RosImage& image, const RosImageFeed::Times& times) {
-  LIMN_TRY(Frame frame, frame_of_ros(image, config_.grey));
+Result<Frame> RosCamera::frame_of(const device::RosImage& image, const RosImageFeed::Times& times) {
+  LIMN_TRY(Frame frame, device::frame_of_ros(image, config_.grey));
   const cv::Size found = frame.image.size();
   if (!config_.size.empty() && found != config_.size)
     return error("expected {}x{}, found {}x{}. Set the camera to that size, or calibrate it at this one.",

@@ -29,7 +29,7 @@ class RosCamera final : public device::CameraSource {
  private:
   explicit RosCamera(const device::CameraConfig& config) : config_(config) {}
   Result<Frame> next_within(double limit_s);
-  Result<Frame> frame_of(const RosImage& image, const RosImageFeed::Times& times);
+  Result<Frame> frame_of(const device::RosImage& image, const RosImageFeed::Times& times);
   std::string why_none() const;
 
   device::CameraConfig config_;

@@ -7,7 +7,7 @@
 
 #include "core/frame.h"
 #include "core/result.h"
-#include "nodes/ros_image.h"
+#include "device/ros_image.h"
 #include "nodes/ros_port.h"
 
 namespace limn::nodes {
@@ -30,7 +30,7 @@ class RosImageFeed {
     std::uint32_t ns = 0;
     Stamp arrived_at;
   };
-  using Use = std::function<void(const RosImage& image, const Times& times)>;
+  using Use = std::function<void(const device::RosImage& image, const Times& times)>;
 
   /// Calls `use` with the newest image that it was not called with before; waits for one. False: none came
   /// until then.

@@ -63,11 +63,10 @@ std::optional<CameraOutput> CameraThreads::take_output(std::chrono::nanoseconds 
   return shared_->newest.take_newest(wait);
 }
 
-void CameraThreads::want_every_image(const std::string& camera, bool is_wanted) {
+void CameraThreads::want_images(const std::string& camera, tracker::DetectionSource::Images images) {
   for (const Running& running : running_)
     if (const auto source = running.source.lock(); source && running.camera == camera)
-      if (auto* detects = dynamic_cast<tracker::DetectionSource*>(source.get()))
-        detects->want_every_image(is_wanted);
+      if (auto* detects = dynamic_cast<tracker::DetectionSource*>(source.get())) detects->want_images(images);
 }
 
 std::size_t CameraThreads::missed() { return shared_->missed.exchange(0); }

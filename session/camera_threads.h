@@ -42,8 +42,8 @@ class CameraThreads {
 
   /// The newest output that was not taken yet; waits up to `wait` for some.
   std::optional<CameraOutput> take_output(std::chrono::nanoseconds wait);
-  /// tracker::DetectionSource::want_every_image(), if the camera is one.
-  void want_every_image(const std::string& camera, bool is_wanted);
+  /// tracker::DetectionSource::want_images(), if the camera is one.
+  void want_images(const std::string& camera, tracker::DetectionSource::Images images);
   /// Number of frames that were dropped since the last call.
   std::size_t missed();
 

@@ -52,18 +52,16 @@ wizard::WizardBackend DeviceCapture::backend(ImageWriter* writer) {
 
 void DeviceCapture::pause_perception(Session* session) {
   perception_->stop();
-  want_every_image(true);
+  for (const std::string& name : camera_names_)
+    cameras_->want_images(name, tracker::DetectionSource::Images::exact);
   if (Perceived last = perception_->take_percepts({}); last.percepts)
     session->update_percepts(std::move(*last.percepts), last.moments);
 }
 
 void DeviceCapture::resume_perception() {
-  want_every_image(false);
+  for (const std::string& name : camera_names_)
+    cameras_->want_images(name, tracker::DetectionSource::Images::some);
   perception_->start();
-}
-
-void DeviceCapture::want_every_image(bool is_wanted) {
-  for (const std::string& name : camera_names_) cameras_->want_every_image(name, is_wanted);
 }
 
 // Shows an image on one projector, and black on the others.

@@ -35,7 +35,6 @@ class DeviceCapture final : public CaptureDevices {
     Frame frame;
     double period_s;
   };
-  void want_every_image(bool is_wanted);
   Status show_pattern(std::size_t projector, const cv::Mat& image);
   Result<cv::Mat> grab(const std::string& camera);
 

@@ -105,9 +105,11 @@ class DeviceSink final : public FrameSink {
   // is behind.
   void show_screens(std::span<const ScreenImages> images) override {
     const Rig& rig = session_->setup().rig;
-    cameras_->want_every_image(
-        rig.cameras[rig.first_visible_camera()].name,
-        std::ranges::any_of(images, [](const auto& drawn) { return !drawn.images.left.empty(); }));
+    const bool is_shown =
+        std::ranges::any_of(images, [](const auto& drawn) { return !drawn.images.left.empty(); });
+    using Images = tracker::DetectionSource::Images;
+    cameras_->want_images(rig.cameras[rig.first_visible_camera()].name,
+                          is_shown ? Images::all : Images::some);
     for (std::size_t i = 0; i < devices_->screens.size(); ++i) {
       device::Display* screen = devices_->screens[i].get();
       if (!screen) continue;

@@ -179,7 +179,7 @@ bool DdsRosImages::use_newest(Stamp arrived_at, const Use& use) const {
   take_all(reader_, [&](const void* sample, const dds_sample_info_t& info) {
     if (!info.valid_data) return;
     is_used = true;
-    RosImage image;
+    device::RosImage image;
     if (type_ == &sensor_msgs_msg_dds__Image__desc) {
       const auto& raw = *static_cast<const Image*>(sample);
       image = {false,    view_of(raw.encoding), raw.width,         raw.height,

@@ -242,8 +242,9 @@ a_thousand_frames_of_three_nodes.nodes = ["left", "right", "top"]
 def a_second_host_is_refused(machines):
     machines.start_host(12)
     time.sleep(4)
+    (machines.folder / "second.json").write_text((machines.folder / "devices.json").read_text())  # of its own machine
     second = machines.start("left", [machines.limn, "live", "--room", "studio", "--name", "second", "--devices",
-                                     machines.folder / "devices.json", "--rig", machines.folder / "recording/rig",
+                                     machines.folder / "second.json", "--rig", machines.folder / "recording/rig",
                                      "--scene", machines.folder / "recording/scene", "--seconds", "1"])
     assert second.wait(20) == 1
     assert "expected no host in it, found host" in (machines.folder / "left.log").read_text()

@@ -331,6 +331,31 @@ TEST_F(NodeTest, DetectsBesideItsCamera) {
   }
 }
 
+// The node draws the session of the host before, and must detect for the new one.
+TEST_F(NodeTest, DetectsForAHostThatWasRestarted) {
+  fs::create_directories(folder_ / "images");
+  const int first = 0;
+  const Frame image = rig_.expose(std::span(&first, 1))[0];
+  ASSERT_TRUE(write_png(folder_ / "image.png", image.image).ok());
+  for (int i = 0; i < 900; ++i)
+    fs::create_symlink(folder_ / "image.png", folder_ / fmt::format("images/{:03}.png", i));
+  device::CameraConfig config{.name = "camera0", .host = "left", .source = (folder_ / "images").string()};
+  config.size = image.image.size();
+  RunningNode node(&room_, "left", folder_ / "node");
+  for (int run = 0; run < 2; ++run) {
+    open_host({config});
+    EXPECT_TRUE(holds_within(20s,
+                             [&] {
+                               const auto got = host_->take_detections("left", "camera0", 50ms);
+                               return got && got->setup == host_->sent_setup() &&
+                                      !got->found.detections.empty();
+                             }))
+        << "run " << run;
+    client_.reset();
+    host_.reset();
+  }
+}
+
 TEST_F(NodeTest, ShowsAndGrabsForACalibration) {
   const cv::Mat image(48, 64, CV_8UC3, cv::Scalar(10, 20, 30));
   fs::create_directories(folder_ / "images");

@@ -19,8 +19,14 @@ class DetectionSource {
   /// Waits a tenth of a second for the next detections or image; both may be absent. Stamps are on this
   /// machine's clock. Error: why there have been none for long.
   virtual Result<Output> next_output() = 0;
-  /// Whether every image shall come; otherwise some in a second do. Safe from another thread.
-  virtual void want_every_image(bool is_wanted) = 0;
+  /// Which images shall come, beside the detections.
+  enum class Images {
+    some,  ///< a few a second; they may be compressed with loss
+    all,   ///< each; likewise
+    exact  ///< each, without loss, for a calibration
+  };
+  /// Safe from another thread.
+  virtual void want_images(Images images) = 0;
 };
 
 }  // namespace limn::tracker

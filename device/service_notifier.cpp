@@ -1,4 +1,4 @@
-#include "core/service_notifier.h"
+#include "device/service_notifier.h"
 
 #include <sys/socket.h>
 #include <sys/un.h>

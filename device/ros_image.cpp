@@ -1,4 +1,4 @@
-#include "nodes/ros_image.h"
+#include "device/ros_image.h"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include "core/image_io.h"
 #include "device/jpeg.h"
 
-namespace limn::nodes {
+namespace limn::device {
 namespace {
 
 constexpr int k_as_it_is = -1;  // no conversion of colours
@@ -162,4 +162,4 @@ Result<Frame> frame_of_ros(const RosImage& image, bool grey) {
   return image.is_compressed ? compressed_frame(image, grey) : raw_frame(image, grey);
 }
 
-}  // namespace limn::nodes
+}  // namespace limn::device

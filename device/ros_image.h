@@ -7,7 +7,7 @@
 #include "core/frame.h"
 #include "core/result.h"
 
-namespace limn::nodes {
+namespace limn::device {
 
 /// An image as a message of ROS 2 states it, unchecked: sensor_msgs/Image or sensor_msgs/CompressedImage. It
 /// borrows the message's memory.
@@ -27,4 +27,4 @@ struct RosImage {
 /// a size that cannot be, a step that is shorter than a row, missing bytes, a damaged JPEG or PNG.
 Result<Frame> frame_of_ros(const RosImage& image, bool grey = false);
 
-}  // namespace limn::nodes
+}  // namespace limn::device
