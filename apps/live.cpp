@@ -364,7 +364,7 @@ Status play_with_devices(const LiveOptions& options) {
   LIMN_TRY(setup.rig, load_rig(options.rig));
   LIMN_TRY(const device::Devices named, options.devices.empty() ? devices_in_room(options.room, setup.rig)
                                                                 : device::load_devices(options.devices));
-  LIMN_TRY(const std::vector<FileLock> locks, device::lock_devices(named));
+  LIMN_TRY(const std::vector<device::FileLock> locks, device::lock_devices(named));
   std::vector<scene::SkippedVariant> skipped_variants;
   LIMN_TRY(setup.scene, scene::load_scene(options.scene, &skipped_variants));
   LIMN_TRY(const device::Devices devices, device::matched(named, setup.rig));

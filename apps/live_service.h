@@ -10,7 +10,7 @@ namespace limn::apps {
 /// loop that hangs sends none, and the manager starts the program again), STATUS=, and STOPPING=1 at the end.
 class LiveService : public session::SessionClient {
  public:
-  LiveService() : notifier_(ServiceNotifier::from_environment()) {}
+  LiveService() : notifier_(device::ServiceNotifier::from_environment()) {}
 
   void apply_edits(const session::SessionMoment& moment) override;
   void publish_state(const session::SessionMoment& moment) override;
@@ -20,7 +20,7 @@ class LiveService : public session::SessionClient {
  private:
   void report_status();
 
-  ServiceNotifier notifier_;
+  device::ServiceNotifier notifier_;
   Stamp alive_at_;   // when WATCHDOG=1 was sent last
   Stamp status_at_;  // when STATUS= was sent last
   int frames_ = 0;   // shown since then

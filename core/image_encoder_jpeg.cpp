@@ -19,7 +19,8 @@ struct Jump {
 };
 
 // Writes into memory of malloc(). It holds no objects with a destructor, because libjpeg may leave it by
-// longjmp. False: libjpeg failed, out of memory.
+// longjmp. False: libjpeg failed, for want of memory or because a side is longer than 65500; the memory is
+// then not freed, since libjpeg does not say where it is.
 bool write_jpeg(const cv::Mat& image, int quality, unsigned char** bytes, unsigned long* count) {
   jpeg_compress_struct jpeg{};
   Jump jump{};
@@ -27,11 +28,11 @@ bool write_jpeg(const cv::Mat& image, int quality, unsigned char** bytes, unsign
   jump.manager.error_exit = [](j_common_ptr info) {
     std::longjmp(reinterpret_cast<Jump*>(info->err)->buffer, 1);
   };
-  jpeg_create_compress(&jpeg);
   if (setjmp(jump.buffer) != 0) {
     jpeg_destroy_compress(&jpeg);
     return false;
   }
+  jpeg_create_compress(&jpeg);
   jpeg_mem_dest(&jpeg, bytes, count);
   jpeg.image_width = static_cast<JDIMENSION>(image.cols);
   jpeg.image_height = static_cast<JDIMENSION>(image.rows);
@@ -57,9 +58,9 @@ std::string encode_jpeg(const cv::Mat& image, int quality) {
   unsigned long count = 0;
   const bool is_written = write_jpeg(image, quality, &bytes, &count);
   std::string text;
-  if (is_written) text.assign(reinterpret_cast<const char*>(bytes), count);
-  std::free(bytes);
   LIMN_CHECK(is_written);
+  text.assign(reinterpret_cast<const char*>(bytes), count);
+  std::free(bytes);
   return text;
 }
 

@@ -3,6 +3,7 @@
 
 #include <bit>
 #include <csetjmp>
+#include <new>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -38,8 +39,15 @@ class PngWriter {
   [[noreturn]] static void on_error(png_structp png, png_const_charp) {
     std::longjmp(static_cast<PngWriter*>(png_get_error_ptr(png))->jump_, 1);
   }
+  // An exception must not leave through libpng.
   static void append(png_structp png, png_bytep bytes, std::size_t count) {
-    static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), count);
+    bool is_kept = true;
+    try {
+      static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), count);
+    } catch (const std::bad_alloc&) {
+      is_kept = false;
+    }
+    if (!is_kept) png_error(png, "no memory");
   }
 
   bool write_all(const cv::Mat& image, std::optional<int> compression) {
@@ -76,7 +84,8 @@ class PngWriter {
 }  // namespace
 
 std::string encode_png(const cv::Mat& image, std::optional<int> compression) {
-  LIMN_CHECK(!image.empty() && (image.depth() == CV_8U || image.depth() == CV_16U) && image.channels() != 2);
+  LIMN_CHECK(!image.empty() && (image.depth() == CV_8U || image.depth() == CV_16U) &&
+             (image.channels() == 1 || image.channels() == 3 || image.channels() == 4));
   return PngWriter().write(image, compression);
 }
 

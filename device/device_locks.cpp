@@ -1,10 +1,12 @@
 #include "device/device_locks.h"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <cctype>
+#include <cerrno>
 #include <cstdlib>
+#include <functional>
+#include <system_error>
 
 namespace limn::device {
 namespace {
@@ -17,27 +19,44 @@ fs::path lock_folder() {
   return fs::temp_directory_path() / fmt::format("limn-{}", getuid());
 }
 
-// Other characters become "_", so that the name is a file's name.
-std::string file_name(std::string name) {
-  std::ranges::replace_if(
-      name, [](unsigned char c) { return !std::isalnum(c) && c != '-' && c != '.'; }, '_');
-  return name + ".lock";
+// The hash of what is locked, which may be longer than a file's name and may hold any characters.
+std::string file_name(const std::string& locked) {
+  return fmt::format("{:016x}.lock", std::hash<std::string>()(locked));
+}
+
+// In a folder for temporary files another user may have made the folder.
+Status check_own(const fs::path& folder) {
+  std::error_code missing;  // then mkdir() fails
+  fs::create_directories(folder.parent_path(), missing);
+  if (mkdir(folder.c_str(), 0700) == 0) return {};
+  struct stat found {};
+  if (lstat(folder.c_str(), &found) != 0)
+    return error("{}: expected a folder for locks, found: {}.", folder.string(),
+                 std::generic_category().message(errno));
+  if (!S_ISDIR(found.st_mode) || found.st_uid != getuid() || (found.st_mode & 022) != 0)
+    return error(
+        "{}: expected a folder that only this user can write, found another. Set XDG_RUNTIME_DIR to one.",
+        folder.string());
+  return {};
 }
 
 }  // namespace
 
 Result<std::vector<FileLock>> lock_devices(const Devices& devices) {
   const fs::path folder = lock_folder();
-  std::error_code no_path;
-  const fs::path file = fs::weakly_canonical(devices.file, no_path);
+  LIMN_TRY_STATUS(check_own(folder));
   std::vector<FileLock> locks;
-  LIMN_TRY(FileLock of_file,
-           FileLock::acquire(folder / file_name("devices" + file.string()), devices.file.string()));
-  locks.push_back(std::move(of_file));
+  if (!devices.file.empty()) {  // without it the devices are what a room offers
+    std::error_code no_path;
+    const fs::path file = fs::weakly_canonical(devices.file, no_path);
+    LIMN_TRY(FileLock of_file,
+             FileLock::acquire(folder / file_name("devices " + file.string()), devices.file.string()));
+    locks.push_back(std::move(of_file));
+  }
   const char* const desktop = std::getenv("DISPLAY");
   for (const DisplayConfig& display : devices.displays) {
     if (!display.host.empty() || display.kind != DisplayKind::monitor) continue;
-    const std::string name = fmt::format("monitor{}-{}", desktop ? desktop : "", display.monitor);
+    const std::string name = fmt::format("monitor {} {}", desktop ? desktop : "", display.monitor);
     LIMN_TRY(FileLock of_monitor, FileLock::acquire(folder / file_name(name),
                                                     fmt::format("{}: displays: the monitor {}",
                                                                 devices.file.string(), display.monitor)));

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "core/file_lock.h"
 #include "device/devices_file.h"
+#include "device/file_lock.h"
 
 namespace limn::device {
 

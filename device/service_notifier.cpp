@@ -9,7 +9,7 @@
 #include <cstring>
 #include <utility>
 
-namespace limn {
+namespace limn::device {
 namespace {
 
 // WATCHDOG_PID, where it is set, says which process the manager means.
@@ -53,4 +53,4 @@ void ServiceNotifier::send(const std::string& lines) const {
                            reinterpret_cast<const sockaddr*>(&to), size));
 }
 
-}  // namespace limn
+}  // namespace limn::device

@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace limn {
+namespace limn::device {
 
 /// Messages to the service manager that has started the program (sd_notify(3) of systemd): one datagram each,
 /// to the socket that NOTIFY_SOCKET names. libsystemd is not used: its own manual shows these lines for
@@ -33,4 +33,4 @@ class ServiceNotifier {
   double watchdog_s_ = 0;
 };
 
-}  // namespace limn
+}  // namespace limn::device

@@ -28,7 +28,7 @@ void replace_word(std::string* text, const std::string& word, const std::string&
 
 bool is_serial(const std::string& word) {
   const auto digits = std::ranges::count_if(word, [](unsigned char c) { return std::isdigit(c); });
-  return word.size() >= 10 && digits >= 6;
+  return digits >= 7 || (word.size() >= 10 && digits >= 6);
 }
 
 // Serial numbers are whole words of letters and digits.
@@ -68,10 +68,12 @@ std::string PrivateWords::without(std::string text) const {
   static const std::regex mac("([0-9A-Fa-f]{2}[:-]){5}[0-9A-Fa-f]{2}");
   static const std::regex v4("\\b(?!127\\.)[0-9]{1,3}(\\.[0-9]{1,3}){3}\\b");
   static const std::regex v6("\\b([0-9A-Fa-f]{1,4}:){3,7}(:?[0-9A-Fa-f]{1,4})+\\b");
-  static const std::regex host("://[^/:\\s]+");
+  // With a login and a port; what follows "?" may be a password.
+  static const std::regex host("://[^/\\s?\"']+"), query("(://\\(address\\)[^\\s?]*)\\?[^\\s\"']*");
+  text = std::regex_replace(text, host, "://(address)");
+  text = std::regex_replace(text, query, "$1");
   for (const auto& [word, by] : replaced_) replace_word(&text, word, by);
   for (const std::regex* address : {&mac, &v4, &v6}) text = std::regex_replace(text, *address, "(address)");
-  text = std::regex_replace(text, host, "://(address)");
   return without_serials(text);
 }
 

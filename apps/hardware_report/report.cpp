@@ -185,7 +185,13 @@ class Report {
     LIMN_TRY_STATUS(make_folder(options_.folder));
     report_ = {
         {"schema", k_schema}, {"limn", version()}, {"begun", time_now()}, {"steps", ordered_json::object()}};
-    if (!fs::exists(file())) return {};
+    if (!fs::exists(file())) {
+      if (fs::is_empty(options_.folder)) return {};
+      return error(
+          "{}: expected a new or empty folder, or a report that was interrupted, found other files, which a "
+          "report could overwrite. Use another folder.",
+          options_.folder.string());
+    }
     LIMN_TRY(const std::string text, read_file(file()));
     const ordered_json old = ordered_json::parse(text, nullptr, false);
     if (!old.is_object() || old.value("schema", "") != k_schema || !old.contains("steps") ||

@@ -54,7 +54,10 @@ TEST(PrivateWords, TakesOutNamesAddressesAndSerialNumbers) {
   EXPECT_EQ(words.without("sam at workshop: /home/sam/rig, the same"),
             "(user) at (machine): (home)/rig, the same");
   EXPECT_EQ(words.without("gige:192.168.7.20 00:11:22:aa:bb:cc"), "gige:(address) (address)");
-  EXPECT_EQ(words.without("mjpeg:http://cam.example.org:80/video"), "mjpeg:http://(address):80/video");
+  EXPECT_EQ(words.without("mjpeg:http://cam.example.org:80/video"), "mjpeg:http://(address)/video");
+  EXPECT_EQ(words.without("rtsp://admin:secret@192.168.7.20:554/s?user=a&password=b is silent"),
+            "rtsp://(address)/s is silent");
+  EXPECT_EQ(words.without("gige:Basler-21853478"), "gige:Basler-(serial)");
   EXPECT_EQ(words.without("Vendor-X100-22345678901 at 1920x1080, 59.940000 Hz"),
             "Vendor-X100-(serial) at 1920x1080, 59.940000 Hz");
 }
@@ -156,6 +159,11 @@ TEST(HardwareReport, RefusesAFolderWithSomethingElse) {
   const auto refused = run_limn({"doctor", "--report", folder.string()});
   EXPECT_EQ(refused.code, 1);
   expect_contains(refused.err, "expected a report of limn doctor (limn.hardware_report/1)");
+  fs::remove(folder / "report.json");
+  ASSERT_TRUE(write_file(folder / "captures.json", "{}"));
+  const auto full = run_limn({"doctor", "--report", folder.string()});
+  EXPECT_EQ(full.code, 1);
+  expect_contains(full.err, "expected a new or empty folder");
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "core/file_lock.h"
+#include "device/file_lock.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -9,7 +9,7 @@
 #include "tests/support/matchers.h"
 #include "tests/support/text.h"
 
-namespace limn {
+namespace limn::device {
 namespace {
 
 TEST(FileLock, IsHeldByOneAndNamesTheHolder) {
@@ -25,4 +25,4 @@ TEST(FileLock, IsHeldByOneAndNamesTheHolder) {
 }
 
 }  // namespace
-}  // namespace limn
+}  // namespace limn::device

@@ -4,7 +4,7 @@
 
 #include "core/result.h"
 
-namespace limn {
+namespace limn::device {
 
 /// A lock that one process at a time can hold. It ends with the process, however that ends.
 class FileLock {
@@ -23,4 +23,4 @@ class FileLock {
   int descriptor_ = -1;
 };
 
-}  // namespace limn
+}  // namespace limn::device

@@ -1,4 +1,4 @@
-#include "core/file_lock.h"
+#include "device/file_lock.h"
 
 #include <fcntl.h>
 #include <sys/file.h>
@@ -12,7 +12,7 @@
 
 #include "core/file.h"
 
-namespace limn {
+namespace limn::device {
 namespace {
 
 std::string holder_of(int descriptor) {
@@ -27,11 +27,14 @@ std::string holder_of(int descriptor) {
 
 Result<FileLock> FileLock::acquire(const std::filesystem::path& file, const std::string& what) {
   LIMN_TRY_STATUS(make_folder(file.parent_path()));
-  const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  const int descriptor = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600);
   if (descriptor < 0)
     return error("{}: expected to write this file, found: {}.", file.string(),
                  std::generic_category().message(errno));
   FileLock lock(descriptor);
+  if (flock(descriptor, LOCK_EX | LOCK_NB) != 0 && errno != EWOULDBLOCK)
+    return error("{}: expected a file system with locks, found: {}.", file.string(),
+                 std::generic_category().message(errno));
   if (flock(descriptor, LOCK_EX | LOCK_NB) != 0)
     return error(
         "{}: expected to use it alone, found that {} uses it. Stop that one first (kill, or, where it "
@@ -56,4 +59,4 @@ FileLock::~FileLock() {
   if (descriptor_ >= 0) close(descriptor_);
 }
 
-}  // namespace limn
+}  // namespace limn::device
