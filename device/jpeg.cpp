@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "core/image_encoder.h"
 #include "core/image_io.h"
 
 namespace limn::device {
@@ -175,18 +176,8 @@ Result<Frame> decode_frame(std::string jpeg, const JpegOptions& options) {
 }
 
 std::vector<std::uint8_t> encode_jpeg(const cv::Mat& image, int quality) {
-  LIMN_CHECK(!image.empty() && (image.type() == CV_8UC1 || image.type() == CV_8UC3));
-  const Handle encoder(tjInitCompress(), tjDestroy);
-  LIMN_CHECK(encoder != nullptr);
-  const bool grey = image.channels() == 1;
-  const int sampling = grey ? TJSAMP_GRAY : TJSAMP_420;
-  std::vector<std::uint8_t> jpeg(tjBufSize(image.cols, image.rows, sampling));
-  unsigned char* at = jpeg.data();
-  unsigned long size = jpeg.size();
-  LIMN_CHECK(tjCompress2(encoder.get(), image.data, image.cols, static_cast<int>(image.step), image.rows,
-                         grey ? TJPF_GRAY : TJPF_BGR, &at, &size, sampling, quality, TJFLAG_NOREALLOC) == 0);
-  jpeg.resize(size);
-  return jpeg;
+  const std::string jpeg = limn::encode_jpeg(image, quality);
+  return {jpeg.begin(), jpeg.end()};
 }
 
 }  // namespace limn::device

@@ -6,7 +6,6 @@
 #include "core/image_formats.h"
 #include "core/log.h"
 #include "device/devices_file.h"
-#include "device/jpeg.h"
 
 namespace limn::nodes {
 namespace {
@@ -66,12 +65,7 @@ Status put(const Frame& frame, bool is_preview, const ClockEstimate& clock, Answ
     answer->image = *frame.jpeg;
     return {};
   }
-  if (is_preview) {
-    const std::vector<std::uint8_t> jpeg = device::encode_jpeg(frame.image, k_preview_quality);
-    answer->image.assign(jpeg.begin(), jpeg.end());
-  } else {
-    answer->image = encode_png(frame.image);
-  }
+  answer->image = is_preview ? encode_jpeg(frame.image, k_preview_quality) : encode_png(frame.image);
   return {};
 }
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <cstdlib>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <regex>
 
@@ -28,7 +29,7 @@ void replace_word(std::string* text, const std::string& word, const std::string&
 
 bool is_serial(const std::string& word) {
   const auto digits = std::ranges::count_if(word, [](unsigned char c) { return std::isdigit(c); });
-  return digits >= 7 || (word.size() >= 10 && digits >= 6);
+  return (digits >= 7 && digits == std::ssize(word)) || (word.size() >= 10 && digits >= 6);
 }
 
 // Serial numbers are whole words of letters and digits.

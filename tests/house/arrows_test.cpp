@@ -95,7 +95,7 @@ const std::map<std::string, Names>& guests() {
       {"dds/", {"nodes"}},
       {"openssl/", {"remote", "nodes"}},
       {"qrencode", {"device/gui"}},
-      {"turbojpeg", {"device"}},
+      {"turbojpeg", {"core", "device"}},
       {"jpeglib", {"core"}},
       {"png.h", {"core"}},
       {"tiffio", {"core"}},
