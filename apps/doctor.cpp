@@ -192,7 +192,7 @@ Finding tested(const std::string& area, const device::CameraConfig& wanted) {
   const auto rate = measure_rate(**camera);
   if (!rate) return failed(area, wanted.name, rate.message());
   const cv::Size size = (*camera)->size();
-  std::string text = fmt::format("{}: {}x{}", wanted.source, size.width, size.height);
+  std::string text = fmt::format("{}: {}x{}", device::without_login(wanted.source), size.width, size.height);
   if (rate->per_second > 0) text += fmt::format(", {:.1f} frames per second", rate->per_second);
   std::string problems;
   for (const device::CameraSetting& setting : (*camera)->settings()) {

@@ -35,4 +35,11 @@ Result<Address> parse_address(const std::string& url,
   return address;
 }
 
+std::string without_login(const std::string& source) {
+  const std::size_t scheme = source.find("://");
+  if (scheme == std::string::npos) return source;
+  const std::size_t begin = scheme + 3, at = source.rfind('@', source.find('/', begin));
+  return at == std::string::npos || at < begin ? source : source.substr(0, begin) + source.substr(at + 1);
+}
+
 }  // namespace limn::device

@@ -19,4 +19,7 @@ Result<Address> parse_address(const std::string& url,
                               const std::string& scheme,
                               const std::string& default_port);
 
+/// A camera's source without NAME:PASSWORD, for messages.
+std::string without_login(const std::string& source);
+
 }  // namespace limn::device

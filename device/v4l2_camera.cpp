@@ -29,15 +29,6 @@ using Clock = std::chrono::steady_clock;
 constexpr unsigned k_buffers = 4;       // one being filled, one waiting, one being read, one spare
 constexpr double k_oldest_stamp_s = 1;  // an older stamp cannot belong to a frame that has just arrived
 
-std::string fourcc(std::uint32_t format) {
-  std::string text;
-  for (int shift = 0; shift < 32; shift += 8) {
-    const char c = static_cast<char>(format >> shift & 0x7f);
-    text += c >= ' ' && c <= '~' ? c : '?';
-  }
-  return text;
-}
-
 // An open device with its ioctls; closed by the destructor.
 class Device {
  public:
@@ -330,6 +321,15 @@ Result<Frame> decoded(const Buffers::Map& map, std::size_t bytes, const v4l2_pix
 }
 
 }  // namespace
+
+std::string fourcc(std::uint32_t format) {
+  std::string text;
+  for (int shift = 0; shift < 32; shift += 8) {
+    const char c = static_cast<char>(format >> shift & 0x7f);
+    text += c >= ' ' && c <= '~' ? c : '?';
+  }
+  return text;
+}
 
 V4l2System V4l2System::kernel() {
   return {

@@ -1,13 +1,19 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "device/camera_source.h"
 #include "device/sensor_settings.h"
 
 namespace limn::device {
+
+/// The name of a pixel format of the kernel, such as MJPG; other characters than letters and signs become
+/// "?".
+std::string fourcc(std::uint32_t format);
 
 /// The kernel functions that V4l2Camera uses. Tests replace them by simulated drivers. Failures set errno.
 struct V4l2System {

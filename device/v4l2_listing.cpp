@@ -10,15 +10,6 @@ namespace {
 
 constexpr unsigned k_most = 256;  // entries in each list; a driver that never ends its list is not followed
 
-std::string letters(std::uint32_t format) {
-  std::string text;
-  for (int shift = 0; shift < 32; shift += 8) {
-    const char c = static_cast<char>(format >> shift & 0x7f);
-    text += c >= ' ' && c <= '~' ? c : '?';
-  }
-  return text;
-}
-
 class Lister {
  public:
   Lister(const V4l2System& system, int fd) : system_(system), fd_(fd) {}
@@ -48,7 +39,7 @@ class Lister {
       size.index = i;
       size.pixel_format = format;
       if (!answers(VIDIOC_ENUM_FRAMESIZES, &size) || size.type != V4L2_FRMSIZE_TYPE_DISCRETE) return;
-      modes->push_back({letters(format), static_cast<int>(size.discrete.width),
+      modes->push_back({fourcc(format), static_cast<int>(size.discrete.width),
                         static_cast<int>(size.discrete.height),
                         rates(format, size.discrete.width, size.discrete.height)});
     }

@@ -17,7 +17,7 @@ struct V4l2Mode {
 /// A control of a camera, as the driver reports it.
 struct V4l2Control {
   std::string name;
-  int value = 0, least = 0, most = 0, present = 0;  ///< `present`: the driver's default
+  int value = 0, minimum = 0, maximum = 0, default_value = 0;
 };
 
 struct V4l2Listing {

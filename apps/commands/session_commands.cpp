@@ -259,7 +259,7 @@ void add_doctor(CLI::App& app, Run& run) {
       "Example: limn doctor --show 10\n"
       "Example: limn doctor --devices config/devices/studio.json --rig rig\n"
       "Example: limn doctor --room studio\n"
-      "Example: limn doctor --report report   (docs/hardware-report.md)");
+      "Example: limn doctor --report report");
   auto options = std::make_shared<DoctorOptions>();
   auto report = std::make_shared<ReportOptions>();
   command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed")

@@ -53,7 +53,7 @@ void add_rows(const std::string& name, const ordered_json& value, std::vector<Ht
   }
 }
 
-// Bars for the distances of frames, in bins of a 20th of the range.
+// Bars for the distances of frames, in bins of equal width.
 std::string distances_drawing(const ordered_json& distances_ms) {
   constexpr int k_bins = 40;
   constexpr double k_width = 800, k_height = 180, k_base = 150;

@@ -99,8 +99,8 @@ ordered_json offers_of(const std::string& source) {
     json["modes"].push_back(fmt::format("{} {}x{} at {:g} frames per second", mode.format, mode.width,
                                         mode.height, fmt::join(mode.rates, ", ")));
   for (const device::V4l2Control& control : listing->controls)
-    json["controls"][control.name] =
-        fmt::format("{} ({} to {}, default {})", control.value, control.least, control.most, control.present);
+    json["controls"][control.name] = fmt::format("{} ({} to {}, default {})", control.value, control.minimum,
+                                                 control.maximum, control.default_value);
   return json;
 }
 
@@ -195,7 +195,7 @@ class Report {
     LIMN_TRY(const std::string text, read_file(file()));
     const ordered_json old = ordered_json::parse(text, nullptr, false);
     if (!old.is_object() || old.value("schema", "") != k_schema || !old.contains("steps") ||
-        !old["steps"].is_object())
+        !std::ranges::all_of(old["steps"], [](const auto& step) { return step.is_object(); }))
       return error("{}: expected a report of limn doctor ({}), found something else. Use another folder.",
                    file().string(), k_schema);
     report_["begun"] = old.value("begun", "");
@@ -373,7 +373,6 @@ class Report {
     LIMN_TRY_STATUS(calib::capture_pose(open->captures, 0, open->backend.capture));
     LIMN_TRY_STATUS(open->backend.wait_for_files());
     Measured out;
-    int images = 0;
     for (int camera = 0; camera < static_cast<int>(open->captures.cameras.size()); ++camera) {
       const fs::path white = calib::image_path(open->captures, 0, 0, camera, 0);
       LIMN_TRY(const cv::Mat image, read_grey_image(white));
@@ -384,10 +383,9 @@ class Report {
             "Capture: no corner of the board was found. Hold it flat into the light, near the "
             "middle of the image, and check that it is the board that was named.");
       out.images.push_back(fs::relative(white, options_.folder).string());
-      ++images;
     }
     out.values["projectors"] = open->captures.projectors.size();
-    out.values["cameras"] = images;
+    out.values["cameras"] = open->captures.cameras.size();
     return out;
   }
 
@@ -422,9 +420,10 @@ class Report {
     options.seconds = options_.live_s;
     options.record = options_.folder / "recording";
     options.out = options_.folder / "live";
-    LIMN_TRY_STATUS(run_live(options));
+    const Status played = run_live(options);
     g_is_interrupted = g_is_interrupted || live_was_ended_by_signal();
     std::signal(SIGINT, interrupt);
+    LIMN_TRY_STATUS(played);
     LIMN_TRY(const std::string text, read_file(options.out / "session.json"));
     Measured out;
     out.values = ordered_json::parse(text, nullptr, false);
@@ -437,8 +436,9 @@ class Report {
           fmt::format("Live: {:.0f} camera frames were not processed, {:.0f} images were shown: "
                       "the machine is too slow for this camera.",
                       missed, shown));
-    for (const char* const image : {"live/screen.png", "live/projector-projector0.png"})
-      if (fs::exists(options_.folder / image)) out.images.emplace_back(image);
+    for (const auto& entry : fs::directory_iterator(options.out, none))
+      if (entry.path().extension() == ".png")
+        out.images.push_back("live/" + entry.path().filename().string());
     return out;
   }
 

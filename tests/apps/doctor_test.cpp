@@ -34,18 +34,6 @@ Finding found(const std::vector<Finding>& findings, const std::string& area, con
   return {};
 }
 
-// An MJPEG camera that sends an image every 20 ms.
-void stream(test::LoopbackClient& client) {
-  std::vector<uchar> bytes;
-  cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(90)), bytes);
-  client.receive_until("\r\n\r\n");
-  bool there = client.send(test::k_mjpeg_answer);
-  while (there) {
-    there = client.send(test::mjpeg_part({bytes.begin(), bytes.end()}));
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-}
-
 fs::path devices_file(const std::string& cameras, const std::string& displays) {
   const fs::path file = test::test_folder() / "devices.json";
   EXPECT_TRUE(
@@ -102,10 +90,10 @@ TEST(Doctor, APackageOfAnotherReleaseIsNotMissing) {
 }
 
 TEST(Doctor, DevicesThatWorkAreOpenedAndMeasured) {
-  test::LoopbackServer server(stream);
+  test::LoopbackServer server(test::stream_grey);
   const fs::path file = devices_file(
       fmt::format(
-          R"({{"name": "camera0", "source": "http://127.0.0.1:{}/"}}, {{"name": "camera1", "source": "one.png"}})",
+          R"({{"name": "camera0", "source": "http://sam:secret@127.0.0.1:{}/"}}, {{"name": "camera1", "source": "one.png"}})",
           server.port()),
       R"({"name": "projector0", "monitor": "offscreen", "size": [320, 200]})");
   ASSERT_TRUE(write_png(file.parent_path() / "one.png", cv::Mat(6, 8, CV_8U, cv::Scalar(9))));
@@ -113,6 +101,7 @@ TEST(Doctor, DevicesThatWorkAreOpenedAndMeasured) {
   const Finding stream = found(findings, "devices", "camera0");
   EXPECT_EQ(stream.state, State::works) << stream.text;
   expect_contains(stream.text, "64x48, ");
+  EXPECT_EQ(stream.text.find("secret"), std::string::npos) << stream.text;
   const double rate = std::atof(stream.text.c_str() + stream.text.find(", ") + 2);
   EXPECT_GT(rate, 20);
   EXPECT_LT(rate, 51);

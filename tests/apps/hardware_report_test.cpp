@@ -109,21 +109,9 @@ TEST(HardwareReport, RunsOnTheVirtualRigAfterAnInterruptionAndIsReadByReplayAndS
   EXPECT_EQ(fs::last_write_time(folder / "frames.csv"), stamps);
 }
 
-// An MJPEG camera that sends an image every 20 ms.
-void stream(test::LoopbackClient& client) {
-  std::vector<uchar> bytes;
-  cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(90)), bytes);
-  client.receive_until("\r\n\r\n");
-  bool there = client.send(test::k_mjpeg_answer);
-  while (there) {
-    there = client.send(test::mjpeg_part({bytes.begin(), bytes.end()}));
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-}
-
 // A report of an MJPEG camera that sees no light, and of this display.
 void expect_report_without_light(const std::string& display) {
-  const test::LoopbackServer server(stream);
+  const test::LoopbackServer server(test::stream_grey);
   const fs::path folder = test::test_folder(), devices = folder / "devices.json";
   ASSERT_TRUE(
       write_file(devices, fmt::format(R"({{"schema": "limn.devices/1", "cameras": [{{"name": "camera0", )"
@@ -159,6 +147,11 @@ TEST(HardwareReport, RefusesAFolderWithSomethingElse) {
   const auto refused = run_limn({"doctor", "--report", folder.string()});
   EXPECT_EQ(refused.code, 1);
   expect_contains(refused.err, "expected a report of limn doctor (limn.hardware_report/1)");
+  ASSERT_TRUE(write_file(folder / "report.json",
+                         R"({"schema": "limn.hardware_report/1", "steps": {"machine": "damaged"}})"));
+  const auto damaged = run_limn({"doctor", "--report", folder.string()});
+  EXPECT_EQ(damaged.code, 1);
+  expect_contains(damaged.err, "expected a report of limn doctor");
   fs::remove(folder / "report.json");
   ASSERT_TRUE(write_file(folder / "captures.json", "{}"));
   const auto full = run_limn({"doctor", "--report", folder.string()});

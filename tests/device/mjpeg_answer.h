@@ -2,7 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <chrono>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/device/loopback_server.h"
 
 namespace limn::test {
 
@@ -14,6 +21,18 @@ inline const std::string k_mjpeg_answer =
 inline std::string mjpeg_part(const std::string& jpeg) {
   return fmt::format("--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {}\r\n\r\n{}\r\n", jpeg.size(),
                      jpeg);
+}
+
+/// An MJPEG camera that sends a grey image every 20 ms, until the client leaves.
+inline void stream_grey(LoopbackClient& client) {
+  std::vector<uchar> bytes;
+  cv::imencode(".jpg", cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(90)), bytes);
+  client.receive_until("\r\n\r\n");
+  bool is_there = client.send(k_mjpeg_answer);
+  while (is_there) {
+    is_there = client.send(mjpeg_part({bytes.begin(), bytes.end()}));
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
 }
 
 }  // namespace limn::test

@@ -72,7 +72,7 @@ TEST(V4l2Listing, HasModesWithRatesAndControlsWithValues) {
   EXPECT_EQ(listing->controls[0].name, "Gain");
   EXPECT_EQ(listing->controls[0].value, 10);
   EXPECT_EQ(listing->controls[1].value, 30);
-  EXPECT_EQ(listing->controls[1].present, 7);
+  EXPECT_EQ(listing->controls[1].default_value, 7);
   EXPECT_EQ(closed, 1);
 }
 

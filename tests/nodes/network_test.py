@@ -49,18 +49,24 @@ def placement_mm(poses, path, slot="mirror"):
     return rms(at_node, *limits), rms(belongs, *limits)
 
 
-def images_are_the_hosts(machines):
-    """Every image that a node shows is the host's, and nearly all frames arrive."""
+def show_images(machines, count):
+    """Runs host and nodes until each node has shown more than `count` images; returns the nodes' shown.csv."""
     for node in NODES:
         machines.start_node(node)
     host = machines.start_host(0)
     paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
-    wait_for(90, lambda: all(rows_in(path) > 60 for path in paths), "the nodes show images")
+    wait_for(90, lambda: all(rows_in(path) > count for path in paths), "the nodes show images")
     machines.end()
     assert host.returncode == 0, "the host failed"
+    return paths
+
+
+def images_are_the_hosts(machines):
+    """Every image that a node shows is the host's, and nearly all frames arrive."""
+    paths = show_images(machines, 60)
     wanted = fingerprints(machines.folder / "host/frames.csv")
-    for node in NODES:
-        rows = shown(machines.folder / f"{node}-0/shown.csv")
+    for node, path in zip(NODES, paths):
+        rows = shown(path)
         wrong = [row["frame"] for row in rows if wanted[row["frame"], row["projector"]] != row["fingerprint"]]
         assert not wrong, f"{node}: {len(wrong)} of {len(rows)} images differ from the host's: {wrong[:5]}"
         late_ms = sorted(abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) / 1e6 for row in rows[10:])
@@ -82,16 +88,10 @@ def a_screen_at_a_node_shows_images(machines):
 
 def nobody_freezes_on_a_bad_network(machines):
     """1 % of all packets are lost, and each is delayed by up to 20 ms."""
-    for node in NODES:
-        machines.start_node(node)
-    host = machines.start_host(0)
-    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
-    wait_for(90, lambda: all(rows_in(path) > 60 for path in paths), "the nodes show images")
-    machines.end()
-    assert host.returncode == 0, "the host failed"
+    paths = show_images(machines, 60)
     wanted = fingerprints(machines.folder / "host/frames.csv")
-    for node in NODES:
-        rows = shown(machines.folder / f"{node}-0/shown.csv")
+    for path in paths:
+        rows = shown(path)
         assert all(wanted[row["frame"], row["projector"]] == row["fingerprint"] for row in rows)
         at_s = [int(row["shown_at_ns"]) / 1e9 for row in rows[5:]]
         pauses = [after - before for before, after in zip(at_s, at_s[1:])]
@@ -105,13 +105,7 @@ nobody_freezes_on_a_bad_network.network = LossyNetwork
 
 def placement_on_a_network(machines):
     """A part that sways by 50 mm in a second; on this network and on one that delays and loses packets."""
-    for node in NODES:
-        machines.start_node(node)
-    host = machines.start_host(0)
-    paths = [machines.folder / f"{node}-0/shown.csv" for node in NODES]
-    wait_for(90, lambda: all(rows_in(path) > 150 for path in paths), "the nodes show images")
-    machines.end()
-    assert host.returncode == 0, "the host failed"
+    paths = show_images(machines, 150)
     numbers = {}
     for node, path in zip(NODES, paths):
         at_node_mm, ideal_mm = placement_mm(machines.folder / "host/poses.csv", path)

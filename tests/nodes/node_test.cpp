@@ -110,6 +110,20 @@ class NodeTest : public ::testing::Test {
     perception_ = session::Perception::create(setup_.scene, setup_.rig).value();
     composer_ = session::FrameComposer::create(setup_.scene, setup_.rig).value();
   }
+  Frame exposed() {
+    const int first = 0;
+    return rig_.expose(std::span(&first, 1))[0];
+  }
+  // A camera of the node "left" that shows this image for 900 frames.
+  device::CameraConfig film_of(const Frame& image) {
+    fs::create_directories(folder_ / "images");
+    EXPECT_TRUE(write_png(folder_ / "image.png", image.image).ok());
+    for (int i = 0; i < 900; ++i)
+      fs::create_symlink(folder_ / "image.png", folder_ / fmt::format("images/{:03}.png", i));
+    device::CameraConfig config{.name = "camera0", .host = "left", .source = (folder_ / "images").string()};
+    config.size = image.image.size();
+    return config;
+  }
   // Composes and sends a frame; returns the fingerprint of the node's image.
   std::uint64_t send_frame() {
     const int camera = 0;
@@ -282,14 +296,8 @@ TEST_F(NodeTest, ABlackFrameWaitsForNothing) {
 
 // The node sends what its camera shows; the host's poses are those of the same images searched here.
 TEST_F(NodeTest, DetectsBesideItsCamera) {
-  fs::create_directories(folder_ / "images");
-  const int first = 0;
-  const Frame image = rig_.expose(std::span(&first, 1))[0];
-  ASSERT_TRUE(write_png(folder_ / "image.png", image.image).ok());
-  for (int i = 0; i < 900; ++i)
-    fs::create_symlink(folder_ / "image.png", folder_ / fmt::format("images/{:03}.png", i));
-  device::CameraConfig config{.name = "camera0", .host = "left", .source = (folder_ / "images").string()};
-  config.size = image.image.size();
+  const Frame image = exposed();
+  const device::CameraConfig config = film_of(image);
   open_host({config});
   RoomOpener opener(host_.get(), nullptr);
   auto camera = opener.camera(config);
@@ -333,14 +341,7 @@ TEST_F(NodeTest, DetectsBesideItsCamera) {
 
 // The node draws the session of the host before, and must detect for the new one.
 TEST_F(NodeTest, DetectsForAHostThatWasRestarted) {
-  fs::create_directories(folder_ / "images");
-  const int first = 0;
-  const Frame image = rig_.expose(std::span(&first, 1))[0];
-  ASSERT_TRUE(write_png(folder_ / "image.png", image.image).ok());
-  for (int i = 0; i < 900; ++i)
-    fs::create_symlink(folder_ / "image.png", folder_ / fmt::format("images/{:03}.png", i));
-  device::CameraConfig config{.name = "camera0", .host = "left", .source = (folder_ / "images").string()};
-  config.size = image.image.size();
+  const device::CameraConfig config = film_of(exposed());
   RunningNode node(&room_, "left", folder_ / "node");
   for (int run = 0; run < 2; ++run) {
     open_host({config});
