@@ -18,6 +18,7 @@
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/print.h"
+#include "device/address.h"
 #include "device/devices_file.h"
 #include "device/gige_camera.h"
 #include "device/gl_context.h"
@@ -208,8 +209,7 @@ Finding tested(const std::string& area, const device::CameraConfig& wanted) {
 // settings.
 Findings cameras(const device::Devices& devices) {
   const auto named = [&](const std::string& source) {
-    return std::any_of(devices.cameras.begin(), devices.cameras.end(),
-                       [&](const device::CameraConfig& camera) { return camera.source == source; });
+    return std::ranges::find(devices.cameras, source, &device::CameraConfig::source) != devices.cameras.end();
   };
   Findings findings;
   for (const device::V4l2Device& found : device::v4l2_cameras()) {

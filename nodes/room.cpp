@@ -161,7 +161,11 @@ void Room::wait(std::chrono::nanoseconds limit) {
 
 bool Room::wait_without_black(Stamp until) {
   std::unique_lock lock(mutex_);
-  return !changed_.wait_until(lock, until, [&] { return moment_ && moment_->frame.is_black; });
+  const auto is_black = [&] { return moment_ && moment_->frame.is_black; };
+  // A clock that steps back meanwhile makes the rest of the wait longer than the whole was.
+  const double whole_s = seconds_between(now(), until);
+  changed_.wait_until(lock, until, [&] { return is_black() || seconds_between(now(), until) > whole_s; });
+  return !is_black();
 }
 
 std::optional<Moment> Room::take_moment() {

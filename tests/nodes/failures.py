@@ -164,6 +164,7 @@ def a_clock_steps(machines):
     wrong = [row for row in rows if abs(int(row["shown_at_ns"]) - int(row["wanted_at_ns"])) > 1e9]
     right_again_s = (int(wrong[-1]["wanted_at_ns"]) - stepped_ns) / 1e9 if wrong else 0.0
     wanted_ns = [int(row["wanted_at_ns"]) for row in rows]
+    assert len(wanted_ns) > 1, "the node shows no images after the step"
     pause_s = max(after - before for before, after in zip(wanted_ns, wanted_ns[1:])) / 1e9
     assert right_again_s < 2 and pause_s < 1.5, (right_again_s, pause_s)
     return {"clock right again after, s": right_again_s, "longest pause of the node itself, s": pause_s,
