@@ -90,7 +90,7 @@ def nobody_freezes_on_a_bad_network(machines):
     """1 % of all packets are lost, and each is delayed by up to 20 ms."""
     paths = show_images(machines, 60)
     wanted = fingerprints(machines.folder / "host/frames.csv")
-    for path in paths:
+    for node, path in zip(NODES, paths):
         rows = shown(path)
         assert all(wanted[row["frame"], row["projector"]] == row["fingerprint"] for row in rows)
         at_s = [int(row["shown_at_ns"]) / 1e9 for row in rows[5:]]
