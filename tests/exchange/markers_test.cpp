@@ -33,7 +33,8 @@ void expect_printed(const std::string& family,
   EXPECT_EQ(read_file(options.out).value().rfind("%PDF", 0), 0u);
   const std::string render =
       "pdftoppm -r 127 -png '" + options.out.string() + "' '" + (folder / "page").string() + "'";
-  ASSERT_EQ(std::system(render.c_str()), 0) << "pdftoppm failed or is missing (poppler-utils, packages.txt)";
+  ASSERT_EQ(std::system(render.c_str()), 0)
+      << "pdftoppm failed or is missing (poppler-utils, tests/packages.txt)";
   const auto grey = read_grey_image(folder / "page-1.png");
   ASSERT_TRUE(grey) << grey.message();
   std::set<std::string> found_ids;
