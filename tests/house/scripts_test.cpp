@@ -79,7 +79,7 @@ TEST_F(Scripts, OnDebianSaysWhatItNeeds) {
   replace("apt-get", "");
   const Ended wrong = run_in_bash(script + "sarge", programs);
   EXPECT_EQ(wrong.code, 2);
-  test::expect_contains(wrong.err, "tools/on_debian bookworm|trixie [COMMAND ...], found 'sarge'");
+  test::expect_contains(wrong.err, "tools/on_debian [--keep] bookworm|trixie [COMMAND ...], found 'sarge'");
   const Ended nowhere = run_in_bash(script + "trixie");
   EXPECT_EQ(nowhere.code, 1);
   test::expect_contains(nowhere.err, "Set LIMN_DEBIAN_MIRROR");
@@ -87,6 +87,24 @@ TEST_F(Scripts, OnDebianSaysWhatItNeeds) {
   EXPECT_EQ(bare.code, 1);
   test::expect_contains(bare.err, "apt-get install mmdebstrap");
   EXPECT_FALSE(fs::exists(folder / "roots"));
+}
+
+TEST_F(Scripts, OtherVersionsOfTheFormatterCheckNoFiles) {
+  const std::string lint = "/bin/bash " LIMN_SOURCE_DIR "/tools/lint";
+  replace("git", "printf 'core/other.cpp\\0'");
+  replace("pyflakes3", "echo 'a bad file'; exit 1");
+  replace("clang-format", "echo 'Debian clang-format version 19.1.7 (3+b1)'");
+  const Ended bad = run_in_bash(lint, {"dirname", "readlink", "sed", "xargs"});
+  EXPECT_EQ(bad.code, 1);
+  EXPECT_EQ(bad.out, "a bad file\n");
+  replace("pyflakes3", "");
+  const Ended other = run_in_bash(lint);
+  EXPECT_EQ(other.code, 0);
+  test::expect_contains(other.err, "expected clang-format 14 (Debian 12), found 19");
+  fs::remove(folder / "clang-format");
+  const Ended missing = run_in_bash(lint);
+  EXPECT_EQ(missing.code, 1);
+  test::expect_contains(missing.err, "found none");
 }
 
 }  // namespace
