@@ -19,7 +19,7 @@ apart() {
 
 # make_root FOLDER RELEASE: a root with the packages that every Debian has, and the sources of the release.
 make_root() {
-  local from mode=root options
+  local from options mode=root
   from="$(mirror)"
   if [ -z "$from" ]; then
     say "expected a Debian mirror in this machine's apt sources, found none. Set LIMN_DEBIAN_MIRROR to its address."
@@ -31,15 +31,14 @@ make_root() {
   fi
   [ "$(id -u)" -eq 0 ] || mode=unshare
   say "making a root of Debian $2 from $from"
-  mkdir -p "$(dirname "$1")" && apart rm -rf "$1.new" && options="$(mktemp)" || return 1
   # The root's apt reaches the mirror as this machine's does (proxy, certificates, checks of dates).
-  apt-config dump | grep -E '^Acquire::(https?|Check-)' >"$options"
-  if mmdebstrap --quiet --variant=minbase --mode="$mode" --aptopt="$options" "$2" "$1.new" \
-    "deb $from $2 main" "deb $from $2-updates main" && mv "$1.new" "$1"; then
-    rm -f "$options"
-    return 0
-  fi
-  rm -f "$options"
+  mapfile -t options < <(apt-config dump | grep -E '^Acquire::(https?|Check-)' | sed 's/^/--aptopt=/')
+  # The archive is unpacked in the namespace of `enter`: that of mmdebstrap has other numbers of users.
+  apart rm -rf "$1.new" && mkdir -p "$1.new" &&
+    mmdebstrap --quiet --variant=minbase --mode="$mode" "${options[@]}" "$2" - \
+      "deb $from $2 main" "deb $from $2-updates main" |
+    apart tar -xf - -C "$1.new" --numeric-owner --exclude='./dev/*' &&
+    [ "${PIPESTATUS[0]}" -eq 0 ] && mv "$1.new" "$1" && return 0
   say "mmdebstrap could not make the root; its messages are above."
   return 1
 }
