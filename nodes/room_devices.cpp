@@ -53,7 +53,7 @@ Result<device::Devices> offered_devices(std::span<const Machine> machines, const
     found += text_of(projector, fits) + "; ";
   }
   for (const Imager& camera : rig.cameras) found += text_of(camera, fitting.emplace_back(cameras)) + "; ";
-  found.resize(found.size() - std::min<std::size_t>(2, found.size()));
+  if (found.size() > 2) found.resize(found.size() - 2);
   if (!is_only_reading(fitting))
     return error(
         "--room: expected --devices with it, or nodes that offer exactly one monitor of each projector's "

@@ -37,7 +37,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: solve_bench FOLDER_OF_GRAYCODE OUT [REPEATS]\n");
     return 2;
   }
-  limn::wizard::SolveCommandOptions options{.captures = argv[1], .out = argv[2]};
+  limn::wizard::SolveCommandOptions options;
+  options.captures = argv[1];
+  options.out = argv[2];
   options.foreign.import_format = limn::wizard::ImportFormat::opencv_gray;
   options.foreign.projector = "1024x768";
   options.foreign.board = "chessboard:9x7:75mm";

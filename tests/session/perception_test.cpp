@@ -203,7 +203,8 @@ std::string text_of(const std::vector<Track>& tracks) {
   std::string text;
   for (const Track& track : tracks) {
     text += fmt::format("{} {} {}", track.body, track.at.time_since_epoch().count(), track.rms_px);
-    for (const double value : track.world_from_body.matrix().reshaped()) text += fmt::format(" {:a}", value);
+    const Eigen::Matrix4d world_from_body = track.world_from_body.matrix();
+    for (const double value : world_from_body.reshaped()) text += fmt::format(" {:a}", value);
     for (const double value : track.covariance.reshaped()) text += fmt::format(" {:a}", value);
   }
   return text;
