@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <limits>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "core/result.h"
 #include "core/screen_encoding.h"
@@ -22,10 +23,18 @@ constexpr const char* k_bold_font = "/usr/share/fonts/truetype/dejavu/DejaVuSans
 // Latin, dashes and dots, arrows, geometric shapes, ticks.
 constexpr std::array<ImWchar, 11> k_glyphs = {0x20,   0x17F,  0x2010, 0x2026, 0x2190, 0x2193,
                                               0x25A0, 0x25FF, 0x2713, 0x2717, 0};
-// GLFW's key codes in the order of ImGui's keys.
-constexpr std::array<int, ImGuiKey_COUNT> k_keys = {258, 263, 262, 265, 264, 266, 267, 268, 269, 260, 261,
-                                                    259, 32,  257, 256, 335, 'A', 'C', 'V', 'X', 'Y', 'Z'};
+constexpr int k_enter = 257, k_keypad_enter = 335;  // one key for ImGui
+// GLFW's key codes of the keys that ImGui uses (versions 1.86 and 1.90 number its keys differently).
+constexpr std::array<std::pair<int, int>, 21> k_keys = {
+    {{ImGuiKey_Tab, 258},      {ImGuiKey_LeftArrow, 263}, {ImGuiKey_RightArrow, 262},
+     {ImGuiKey_UpArrow, 265},  {ImGuiKey_DownArrow, 264}, {ImGuiKey_PageUp, 266},
+     {ImGuiKey_PageDown, 267}, {ImGuiKey_Home, 268},      {ImGuiKey_End, 269},
+     {ImGuiKey_Insert, 260},   {ImGuiKey_Delete, 261},    {ImGuiKey_Backspace, 259},
+     {ImGuiKey_Space, 32},     {ImGuiKey_Enter, k_enter}, {ImGuiKey_Escape, 256},
+     {ImGuiKey_A, 'A'},        {ImGuiKey_C, 'C'},         {ImGuiKey_V, 'V'},
+     {ImGuiKey_X, 'X'},        {ImGuiKey_Y, 'Y'},         {ImGuiKey_Z, 'Z'}}};
 constexpr int k_shift = 340, k_control = 341, k_right_shift = 344, k_right_control = 345;
+constexpr int k_key_codes = 512;  // ImGui's own keys begin there in version 1.90
 
 ImFont* font(const char* file, float pixels) {
   ImFontAtlas& atlas = *ImGui::GetIO().Fonts;
@@ -73,7 +82,7 @@ Gui::Gui(float scale) : em_(std::round(k_text_px * scale)), context_(ImGui::Crea
   ImGui::SetCurrentContext(context_);
   ImGuiIO& io = ImGui::GetIO();
   io.IniFilename = io.LogFilename = nullptr;
-  std::copy(k_keys.begin(), k_keys.end(), io.KeyMap);
+  for (const auto& [key, code] : k_keys) io.KeyMap[key] = code;
   font(k_font, em_);
   heading_ = font(k_bold_font, std::round(k_heading_px * scale));
   set_theme(scale);
@@ -100,11 +109,12 @@ void Gui::feed(cv::Size pixels, double seconds, const device::WindowInput& input
   for (const int code : released_) io.KeysDown[code] = false;
   released_.clear();
   for (const device::WindowInput::Key& key : input.keys) {
-    if (key.code < 0 || key.code >= IM_ARRAYSIZE(io.KeysDown)) continue;
+    if (key.code < 0 || key.code >= k_key_codes) continue;
+    const int code = key.code == k_keypad_enter ? k_enter : key.code;
     if (key.is_down)
-      io.KeysDown[key.code] = true;
+      io.KeysDown[code] = true;
     else
-      released_.push_back(key.code);
+      released_.push_back(code);
   }
   io.KeyShift = io.KeysDown[k_shift] || io.KeysDown[k_right_shift];
   io.KeyCtrl = io.KeysDown[k_control] || io.KeysDown[k_right_control];
