@@ -208,6 +208,11 @@ TEST(LiveService, IsNotStartedTwiceOnTheSameDevicesOrMonitor) {
                         "other.json: displays: the monitor HDMI-1: expected to use it");
   other.displays[0].monitor = "HDMI-2";
   EXPECT_TRUE(device::lock_devices(other));
+
+  ASSERT_TRUE(write_file(folder / "file", "no folder"));
+  setenv("XDG_RUNTIME_DIR", (folder / "file/runtime").c_str(), 1);
+  test::expect_contains(device::lock_devices(other).message(),
+                        "for the locks of devices, found: Not a directory");
 }
 
 }  // namespace
