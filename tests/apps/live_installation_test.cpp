@@ -220,6 +220,20 @@ TEST_F(Installation, ShowsBlackLastWhenItIsEnded) {
   EXPECT_EQ(windows().size(), 0u);
 }
 
+// Libraries of EGL's callers end the process without it.
+TEST_F(Installation, SaysThatEglIsMissing) {
+  const fs::path folder = test::test_folder();
+  write_files(folder);
+  fs::create_directories(folder / "libraries");
+  ASSERT_TRUE(write_file(folder / "libraries/libEGL.so.1", "no library"));
+  const std::string without = "LD_LIBRARY_PATH=" + (folder / "libraries").string() + " " LIMN_PROGRAM " ";
+  for (const std::string& command : {live_in(folder), std::string("doctor --show 0.1")}) {
+    const Ended ended = run(without + command);
+    EXPECT_EQ(ended.code, 1);
+    expect_contains(ended.out, "OpenGL: expected the library libEGL.so.1, found none. Install ");
+  }
+}
+
 class Service : public Installation {
  protected:
   void SetUp() override {
