@@ -260,8 +260,9 @@ class Service : public Installation {
     return run("systemctl --user show --value -p " + name + " limn-live").out;
   }
   static pid_t process() { return std::atoi(property("MainPID").c_str()); }
+  // By the program's name: the journal asks the process for its unit, which may have ended by then.
   static std::string journal(const std::string& options) {
-    return run("journalctl --no-pager -o cat _SYSTEMD_USER_UNIT=limn-live.service " + options).out;
+    return run("journalctl --no-pager -o cat -t limn " + options).out;
   }
   // The seconds until it is ready again as another process.
   static double restarted_s(pid_t before) {
@@ -277,7 +278,7 @@ TEST_F(Service, IsKeptRunningBySystemdAndEndsBlack) {
   paint_desktop(0);  // as the kiosk's recipe in docs/setting-up.md
   const Ended started = run("systemctl --user start limn-live");
   ASSERT_EQ(started.code, 0) << started.out << journal("");
-  EXPECT_TRUE(within(2, [&] { return is_lit(); })) << journal("");
+  EXPECT_TRUE(within(10, [&] { return is_lit(); })) << journal("");
   expect_contains(property("StatusText"), "frame");
 
   const pid_t hung = process();
@@ -285,13 +286,13 @@ TEST_F(Service, IsKeptRunningBySystemdAndEndsBlack) {
   kill(hung, SIGSTOP);
   EXPECT_GT(restarted_s(hung), 4) << "before WatchdogSec=10 had passed since the last sign of life";
   EXPECT_EQ(property("NRestarts"), "1");
-  EXPECT_TRUE(within(2, [&] { return is_lit(); }));
+  EXPECT_TRUE(within(10, [&] { return is_lit(); }));
 
   const pid_t killed = process();
   ASSERT_GT(killed, 1);
   const Stamp killed_at = now();
   kill(killed, SIGKILL);
-  ASSERT_TRUE(within(1, [&] { return !is_lit(); }));
+  ASSERT_TRUE(within(10, [&] { return !is_lit(); }));
   ASSERT_TRUE(within(30, [&] { return is_lit(); })) << journal("");
   const double light_s = seconds_between(killed_at, now());
   RecordProperty("light_s", std::to_string(light_s));
@@ -309,7 +310,7 @@ TEST_F(Service, IsKeptRunningBySystemdAndEndsBlack) {
   EXPECT_TRUE(is_black());
 
   const std::string warning = "expected the monitor DUMMY9";
-  expect_contains(journal(""), "pictures: ");
+  EXPECT_TRUE(within(10, [] { return journal("").find("pictures: ") != std::string::npos; })) << journal("");
   expect_contains(journal("-p warning"), warning);
   EXPECT_EQ(journal("-p warning").find("pictures: "), std::string::npos);
   EXPECT_EQ(journal("-p err").find(warning), std::string::npos);
@@ -319,7 +320,8 @@ TEST_F(Service, IsNotTriedAgainWithAWrongOption) {
   ASSERT_TRUE(write_file(live_ / "../live.env", "LIMN_LIVE_OPTIONS=--prediction never\n"));
   EXPECT_NE(run("systemctl --user start limn-live").code, 0);
   EXPECT_EQ(property("ActiveState") + " " + property("ExecMainStatus"), "failed 2");
-  expect_contains(journal("-p err"), "--prediction: ");
+  EXPECT_TRUE(within(10, [] { return journal("-p err").find("--prediction: ") != std::string::npos; }))
+      << journal("");
 }
 
 }  // namespace
