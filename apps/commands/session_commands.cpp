@@ -7,7 +7,6 @@
 #include "apps/commands/options.h"
 #include "apps/demo.h"
 #include "apps/doctor.h"
-#include "apps/hardware_report/report.h"
 #include "apps/live.h"
 #include "apps/replay.h"
 #include "apps/room.h"
@@ -261,7 +260,7 @@ void add_doctor(CLI::App& app, Run& run) {
       "Example: limn doctor --room studio\n"
       "Example: limn doctor --report report");
   auto options = std::make_shared<DoctorOptions>();
-  auto report = std::make_shared<ReportOptions>();
+  auto report = std::make_shared<validate::ReportOptions>();
   command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed")
       ->type_name("ROOM");
   add_room_options(command, &options->room);
@@ -300,7 +299,7 @@ void add_doctor(CLI::App& app, Run& run) {
       if (report->folder.empty()) return report_result(run_doctor(*options));
       report->devices = options->devices;
       report->rig = options->rig;
-      return report_result(run_hardware_report(*report));
+      return report_result(run_report(*report));
     };
   });
 }

@@ -1,4 +1,4 @@
-#include "apps/hardware_report/private_words.h"
+#include "validate/hardware_report/private_words.h"
 
 #include <pwd.h>
 #include <unistd.h>
@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 bool is_word(char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_'; }
@@ -86,4 +86,4 @@ nlohmann::ordered_json PrivateWords::json_without(const nlohmann::ordered_json& 
   return out;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

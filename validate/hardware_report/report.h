@@ -1,11 +1,14 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
+#include "validate/hardware_report/finding.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 struct ReportOptions {
   std::filesystem::path folder;        ///< What was measured before stays in it and is not repeated.
@@ -16,11 +19,27 @@ struct ReportOptions {
   bool with_names = false;                  ///< Keeps names, addresses and serial numbers.
 };
 
+/// A session that is recorded for the report.
+struct ReportSession {
+  std::filesystem::path rig, scene, devices;  ///< empty: the virtual rig
+  double seconds = 0;
+  std::filesystem::path record, out;  ///< folders of the recording and of what the session writes
+};
+
+/// What the report does with other commands.
+struct ReportCommands {
+  /// The tests of `limn doctor` with this devices file, which may be empty.
+  std::function<std::vector<Finding>(const std::filesystem::path& devices)> examine;
+  /// Plays a session as `limn live` does, and says whether a signal has ended it. It may leave signal
+  /// handlers of its own.
+  std::function<Status(const ReportSession& session, bool* was_interrupted)> play;
+};
+
 /// `limn doctor --report FOLDER`: measures a machine with its devices and writes one folder to send:
 /// report.json (limn.hardware_report/1), report.html, frames.csv, captures/ (limn solve reads it), recording/
 /// (limn replay reads it) and live/. Questions on a terminal have defaults; without a terminal the defaults
 /// are taken. A step that fails is written down, and the next one follows. Error: interrupted (the same
 /// command goes on), a folder that cannot be written, or a report.json of something else.
-Status run_hardware_report(const ReportOptions& options);
+Status run_hardware_report(const ReportOptions& options, const ReportCommands& commands);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// Replaces what would say whose machine this is: the machine's, the user's and the home folder's name,
 /// network addresses, and numbers that look like serial numbers (ten or more characters with six digits).
@@ -25,4 +25,4 @@ class PrivateWords {
   std::vector<std::pair<std::string, std::string>> replaced_;  // word -> what stands for it
 };
 
-}  // namespace limn::apps
+}  // namespace limn::validate

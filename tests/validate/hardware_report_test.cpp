@@ -7,9 +7,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
-#include "apps/hardware_report/frame_times.h"
-#include "apps/hardware_report/private_words.h"
-#include "apps/hardware_report/report.h"
 #include "calib/capture_set.h"
 #include "core/file.h"
 #include "device/desktop.h"
@@ -19,8 +16,11 @@
 #include "tests/support/matchers.h"
 #include "tests/support/run_limn.h"
 #include "tests/support/text.h"
+#include "validate/hardware_report/frame_times.h"
+#include "validate/hardware_report/private_words.h"
+#include "validate/hardware_report/report.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -160,4 +160,4 @@ TEST(HardwareReport, RefusesAFolderWithSomethingElse) {
 }
 
 }  // namespace
-}  // namespace limn::apps
+}  // namespace limn::validate

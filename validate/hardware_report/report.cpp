@@ -1,4 +1,4 @@
-#include "apps/hardware_report/report.h"
+#include "validate/hardware_report/report.h"
 
 #include <fmt/ranges.h>
 #include <sys/utsname.h>
@@ -13,11 +13,6 @@
 #include <optional>
 #include <thread>
 
-#include "apps/doctor.h"
-#include "apps/hardware_report/frame_times.h"
-#include "apps/hardware_report/page.h"
-#include "apps/hardware_report/private_words.h"
-#include "apps/live.h"
 #include "calib/temporary_folder.h"
 #include "core/data_folder.h"
 #include "core/file.h"
@@ -32,6 +27,9 @@
 #include "nodes/remote_devices.h"
 #include "sim/virtual_rig.h"
 #include "tracker/marker_image.h"
+#include "validate/hardware_report/frame_times.h"
+#include "validate/hardware_report/page.h"
+#include "validate/hardware_report/private_words.h"
 #include "wizard/capture/capture_plan.h"
 #include "wizard/capture/device_backend.h"
 #include "wizard/capture/virtual_backend.h"
@@ -39,7 +37,7 @@
 #include "wizard/device_checks.h"
 #include "wizard/guided_poses.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -159,8 +157,8 @@ struct Measured {
 
 class Report {
  public:
-  explicit Report(const ReportOptions& options)
-      : options_(options), words_(PrivateWords::of_this_machine()) {}
+  Report(const ReportOptions& options, const ReportCommands& commands)
+      : options_(options), commands_(commands), words_(PrivateWords::of_this_machine()) {}
 
   Status run() {
     LIMN_TRY_STATUS(go_on());
@@ -291,7 +289,7 @@ class Report {
         static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
     out.values["memory"] = fmt::format("{:.1f} GiB", bytes / (1 << 30));
     out.values["tests"] = ordered_json::array();
-    for (const Finding& finding : examined({.devices = options_.devices})) {
+    for (const Finding& finding : commands_.examine(options_.devices)) {
       const char* const state = finding.state == Finding::State::works   ? "works"
                                 : finding.state == Finding::State::fails ? "fails"
                                                                          : "note";
@@ -390,8 +388,8 @@ class Report {
   }
 
   // The devices' files as a session needs them, kept out of the report because they may hold addresses.
-  Result<LiveOptions> live_on_devices(const fs::path& work) const {
-    LiveOptions options;
+  Result<ReportSession> session_on_devices(const fs::path& work) const {
+    ReportSession options;
     options.rig = options_.rig;
     options.devices = work / "devices.json";
     LIMN_TRY_STATUS(write_file(options.devices, device::devices_text(named_.cameras, named_.displays)));
@@ -412,16 +410,16 @@ class Report {
     std::error_code none;
     for (const char* const part : {"recording", "live"}) fs::remove_all(options_.folder / part, none);
     LIMN_TRY(const calib::TemporaryFolder work, calib::TemporaryFolder::create());
-    LiveOptions options;
+    ReportSession options;
     if (!is_virtual()) {
-      LIMN_TRY(options, live_on_devices(work.path()));
+      LIMN_TRY(options, session_on_devices(work.path()));
     }
-    options.is_real_time = true;
     options.seconds = options_.live_s;
     options.record = options_.folder / "recording";
     options.out = options_.folder / "live";
-    const Status played = run_live(options);
-    g_is_interrupted = g_is_interrupted || live_was_ended_by_signal();
+    bool was_interrupted = false;
+    const Status played = commands_.play(options, &was_interrupted);
+    g_is_interrupted = g_is_interrupted || was_interrupted;
     std::signal(SIGINT, interrupt);
     LIMN_TRY_STATUS(played);
     LIMN_TRY(const std::string text, read_file(options.out / "session.json"));
@@ -443,6 +441,7 @@ class Report {
   }
 
   ReportOptions options_;
+  ReportCommands commands_;
   PrivateWords words_;
   device::Devices named_;
   ordered_json report_;
@@ -451,12 +450,12 @@ class Report {
 
 }  // namespace
 
-Status run_hardware_report(const ReportOptions& options) {
+Status run_hardware_report(const ReportOptions& options, const ReportCommands& commands) {
   g_is_interrupted = false;
   const auto before = std::signal(SIGINT, interrupt);
-  const Status done = Report(options).run();
+  const Status done = Report(options, commands).run();
   std::signal(SIGINT, before);
   return done;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -1,4 +1,4 @@
-#include "apps/hardware_report/page.h"
+#include "validate/hardware_report/page.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "core/json_text.h"
 #include "core/svg.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -125,4 +125,4 @@ Status write_report_page(const ordered_json& report, const fs::path& folder) {
                     html_page("Limn hardware report", HtmlColours::of_system, k_style, html + steps));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate
