@@ -356,7 +356,7 @@ Status run_doctor(const DoctorOptions& options) {
   return error("{} of {} do not work; the lines above say what to do.", failures, findings.size());
 }
 
-Status run_report(const validate::ReportOptions& options) {
+validate::ReportCommands report_commands() {
   const auto examine = [](const std::filesystem::path& devices) { return examined({.devices = devices}); };
   const auto play = [](const validate::ReportSession& session, bool* was_interrupted) {
     LiveOptions options;
@@ -371,7 +371,7 @@ Status run_report(const validate::ReportOptions& options) {
     *was_interrupted = live_was_ended_by_signal();
     return played;
   };
-  return validate::run_hardware_report(options, {examine, play});
+  return {.examine = examine, .play = play};
 }
 
 }  // namespace limn::apps

@@ -33,7 +33,7 @@ std::vector<Finding> examined(const DoctorOptions& options);
 /// `limn doctor`: prints the result of examined(). Error when something that was asked for does not work.
 Status run_doctor(const DoctorOptions& options);
 
-/// `limn doctor --report`: run_hardware_report() with these tests and with live sessions.
-Status run_report(const validate::ReportOptions& options);
+/// What run_hardware_report() (`limn doctor --report`) needs: these tests, and live sessions.
+validate::ReportCommands report_commands();
 
 }  // namespace limn::apps

@@ -286,20 +286,26 @@ void add_doctor(CLI::App& app, Run& run) {
       ->type_name("BOARD")
       ->capture_default_str()
       ->needs(folder);
+  command
+      ->add_option("--placements", report->placements,
+                   "With --report: how often the board is captured; limn solve needs it in 3 placements")
+      ->check(CLI::Range(1, 9))
+      ->capture_default_str()
+      ->needs(folder);
   command->add_option("--live-seconds", report->live_s, "With --report: length of the recorded session")
       ->check(CLI::Range(1.0, 3600.0))
       ->capture_default_str()
       ->needs(folder);
   command
       ->add_flag("--with-names", report->with_names,
-                 "With --report: keep names, addresses and serial numbers in it")
+                 "With --report: keep names, addresses and serial numbers in all its files")
       ->needs(folder);
   command->callback([options, report, &run] {
     run = [options, report] {
       if (report->folder.empty()) return report_result(run_doctor(*options));
       report->devices = options->devices;
       report->rig = options->rig;
-      return report_result(run_report(*report));
+      return report_result(validate::run_hardware_report(*report, report_commands()));
     };
   });
 }

@@ -7,22 +7,29 @@
 
 namespace limn::validate {
 
-/// Replaces what would say whose machine this is: the machine's, the user's and the home folder's name,
-/// network addresses, and numbers that look like serial numbers (ten or more characters with six digits).
+/// Replaces what would say whose machine this is. Known words are replaced wherever they stand alone, in
+/// capitals or not, also as JSON, HTML and addresses write them. As a second net, what has the form of an
+/// address or of a serial number in a device's path is replaced. Versions and numbers stay.
 class PrivateWords {
  public:
-  /// Those of this machine.
-  static PrivateWords of_this_machine();
+  PrivateWords() = default;
 
-  explicit PrivateWords(std::vector<std::pair<std::string, std::string>> replaced)
-      : replaced_(std::move(replaced)) {}
+  /// `by` stands for `word` from now on. Words that are too short or too common to identify anybody (`root`,
+  /// `camera`, under three characters, under six digits alone) are not added.
+  void add(const std::string& word, const std::string& by);
 
-  std::string without(std::string text) const;
-  /// All texts in it.
+  /// The text without known words and without what has the form of a private one. It may be a whole file:
+  /// JSON, HTML and CSV stay what they are.
+  std::string without(const std::string& text) const;
+  /// All texts in it, names of members included.
   nlohmann::ordered_json json_without(const nlohmann::ordered_json& json) const;
+  /// Whether a known word is in the text.
+  bool is_in(const std::string& text) const;
 
  private:
-  std::vector<std::pair<std::string, std::string>> replaced_;  // word -> what stands for it
+  std::string without_known(const std::string& text) const;
+
+  std::vector<std::pair<std::string, std::string>> replaced_;  // word, in small letters -> what stands for it
 };
 
 }  // namespace limn::validate
