@@ -152,7 +152,7 @@ TEST(HardwareReport, RunsOnTheVirtualRigAfterInterruptionsAndIsReadByReplayAndSo
 }
 
 fs::path devices_file(const std::string& cameras, const std::string& displays) {
-  const fs::path file = test::test_folder() / "devices.json";
+  fs::path file = test::test_folder() / "devices.json";
   EXPECT_TRUE(
       write_file(file, fmt::format(R"({{"schema": "limn.devices/1", "cameras": [{}], "displays": [{}]}})",
                                    cameras, displays)));

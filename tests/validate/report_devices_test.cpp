@@ -4,6 +4,7 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <string>
 #include <thread>
 
 #include "core/file.h"

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <nlohmann/json.hpp>
+#include <map>
+#include <string>
 
 #include "core/file.h"
 #include "tests/support/matchers.h"

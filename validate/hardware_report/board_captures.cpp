@@ -104,7 +104,7 @@ Status capture_board(const OpenDevices& devices, int placements, Questions* ques
     }
     const Status captured = calib::capture_pose(captures, pose, devices.backend().capture);
     LIMN_TRY_STATUS(devices.backend().wait_for_files());
-    LIMN_TRY_STATUS(captured);
+    if (!captured) return captured;
     for (int camera = 0; questions && camera < std::ssize(captures.cameras); ++camera) {
       LIMN_TRY(const cv::Mat image, read_grey_image(white_image(captures, pose, camera)));
       print_out("  {}: {} corners of the board\n", captures.cameras[static_cast<std::size_t>(camera)].name,

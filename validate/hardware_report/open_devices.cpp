@@ -24,16 +24,17 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 struct OpenDevices::Impl {
+  Impl() noexcept(false) {}  // defaults of its members allocate
   calib::CaptureSet captures;
   wizard::WizardBackend backend;
   ordered_json settings;
   // What the backend refers to.
-  wizard::Plan plan = {};
-  std::optional<device::Desktop> desktop = {};
-  std::unique_ptr<device::DeviceOpener> opener = {};
-  std::unique_ptr<wizard::DeviceBackend> real = {};
-  std::unique_ptr<sim::VirtualRig> rig = {};
-  std::unique_ptr<ImageWriter> writer = {};
+  wizard::Plan plan;
+  std::optional<device::Desktop> desktop;
+  std::unique_ptr<device::DeviceOpener> opener;
+  std::unique_ptr<wizard::DeviceBackend> real;
+  std::unique_ptr<sim::VirtualRig> rig;
+  std::unique_ptr<ImageWriter> writer;
 };
 
 namespace {

@@ -49,7 +49,7 @@ void add_rows(const std::string& name, const ordered_json& value, std::vector<Ht
   int number = 0;
   for (const auto& [key, part] : value.items()) {
     const std::string own = value.is_array() ? std::to_string(++number) : key;
-    add_rows(name.empty() ? own : name + " " + own, part, rows);
+    add_rows(name.empty() ? own : fmt::format("{} {}", name, own), part, rows);
   }
 }
 

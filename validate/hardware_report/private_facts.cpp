@@ -115,7 +115,7 @@ void add_serial_in(PrivateWords* words, const fs::path& file) {
   const auto text = read_file(file);
   if (!text) return;
   const std::vector<std::string> parts = split(*text, "\n");
-  if (!parts.empty() && parts[0].size() >= 6 && parts[0].find_first_not_of("0") != std::string::npos)
+  if (!parts.empty() && parts[0].size() >= 6 && parts[0].find_first_not_of('0') != std::string::npos)
     words->add(parts[0], "(serial)");
 }
 

@@ -1,6 +1,7 @@
 #include "validate/hardware_report/private_words.h"
 
 #include <arpa/inet.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -166,7 +167,7 @@ std::size_t authority_end(const std::string& text, std::size_t at) {
 std::string without_urls(const std::string& text) {
   std::string out;
   std::size_t at = 0;
-  for (std::size_t mark; (mark = text.find("://", at)) != std::string::npos;) {
+  for (std::size_t mark = 0; (mark = text.find("://", at)) != std::string::npos;) {
     const std::size_t begin = mark + 3;
     out.append(text, at, begin - at);
     at = begin;
@@ -292,7 +293,7 @@ std::string PrivateWords::without(const std::string& text) const {
   static const std::string k_image = ";base64,";
   std::string out;
   std::size_t at = 0;
-  for (std::size_t mark; (mark = text.find(k_image, at)) != std::string::npos;) {
+  for (std::size_t mark = 0; (mark = text.find(k_image, at)) != std::string::npos;) {
     const std::size_t begin = mark + k_image.size();
     out += cleaned(text.substr(at, begin - at));
     const auto image =

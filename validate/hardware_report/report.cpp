@@ -282,7 +282,7 @@ class Report {
     bool was_interrupted = false;
     const Status played = commands_.play(options, &was_interrupted);
     interruption_->take_back(was_interrupted);
-    LIMN_TRY_STATUS(played);
+    if (!played) return played.error();
     LIMN_TRY(const std::string text, read_file(options.out / "session.json"));
     Measured out;
     out.values = ordered_json::parse(text, nullptr, false);
