@@ -44,14 +44,15 @@ const std::map<std::string, Names>& allowed() {
       {"exchange/poses", {"core"}},
       {"exchange/printing", {"core", "calib", "tracker"}},
       {"design", {"core", "calib", "tracker"}},
-      {"wizard", with({"device/gui"})},
+      {"wizard/measure", {"core", "scene", "calib", "tracker"}},
+      {"wizard", with({"device/gui", "wizard/measure"})},
       {"session/drawing", {"core", "scene", "tracker", "projector"}},
       {"session", with({"device/gui", "exchange/poses", "wizard", "session/drawing"})},
       {"remote", with({"device/gui", "session", "session/drawing"})},
       {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing", "remote"})},
-      {"validate", with({"wizard", "session", "session/drawing"})},
-      {"apps", with({"device/gui", "exchange", "exchange/printing", "design", "wizard", "session",
-                     "session/drawing", "remote", "nodes", "validate"})},
+      {"validate", with({"wizard", "wizard/measure", "session", "session/drawing"})},
+      {"apps", with({"device/gui", "exchange", "exchange/printing", "design", "wizard", "wizard/measure",
+                     "session", "session/drawing", "remote", "nodes", "validate"})},
   };
   return arrows;
 }
@@ -67,7 +68,7 @@ const std::map<std::string, std::map<std::string, int>>& inner_order() {
         {"calib/response", 2},
         {"calib/judge", 3},
         {"calib/report", 4}}},
-      {"wizard", {{"wizard/capture", 0}, {"wizard/measure", 0}, {"wizard", 1}, {"wizard/window", 2}}},
+      {"wizard", {{"wizard/capture", 0}, {"wizard", 1}, {"wizard/window", 2}}},
       {"remote",
        {{"remote/http", 0}, {"remote/tablet", 0}, {"remote/glasses", 0}, {"remote/api", 1}, {"remote", 2}}},
       {"tracker", {{"tracker", 0}, {"tracker/balls", 1}, {"tracker/feeds", 1}, {"tracker/cameras", 2}}},
