@@ -51,6 +51,7 @@ const std::map<std::string, Names>& allowed() {
       {"remote", with({"device/gui", "session", "session/drawing"})},
       {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing", "remote"})},
       {"validate", with({"wizard", "wizard/measure", "session", "session/drawing"})},
+      {"library", {"core", "scene", "device", "calib", "tracker", "projector", "exchange", "wizard/measure"}},
       {"apps", with({"device/gui", "exchange", "exchange/printing", "design", "wizard", "wizard/measure",
                      "session", "session/drawing", "remote", "nodes", "validate"})},
   };
