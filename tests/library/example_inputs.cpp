@@ -1,0 +1,128 @@
+#include "tests/library/example_inputs.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <stdexcept>
+
+#include "calib/board/board.h"
+#include "core/cameramodel.h"
+#include "core/config.h"
+#include "core/file.h"
+#include "core/image_io.h"
+#include "scene/marker_file.h"
+#include "tests/tracker/marker_images.h"
+
+namespace limn::test {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+void expect(const Status& status) {
+  if (!status) throw std::runtime_error(status.message());
+}
+
+// The board as the camera sees it, with nine rays for each pixel.
+cv::Mat photograph(const Imager& camera, const calib::BoardSheet& sheet, const Pose& camera_from_board) {
+  constexpr int k_samples = 3;
+  const Pose board_from_camera = camera_from_board.inverse();
+  cv::Mat fine(camera.height * k_samples, camera.width * k_samples, CV_8U);
+  for (int y = 0; y < fine.rows; ++y) {
+    for (int x = 0; x < fine.cols; ++x) {
+      const Vector2d px((x + 0.5) / k_samples - 0.5, (y + 0.5) / k_samples - 0.5);
+      const Vector3d d = board_from_camera.rotation * *camera.lens.unproject(px);
+      const Vector3d p = board_from_camera.translation - board_from_camera.translation.z() / d.z() * d;
+      const Vector2d at = sheet.px_board_origin + sheet.pixels_per_metre * p.head<2>();
+      const int u = static_cast<int>(std::lround(at.x())), v = static_cast<int>(std::lround(at.y()));
+      const bool is_ink = u >= 0 && v >= 0 && u < sheet.image.cols && v < sheet.image.rows &&
+                          sheet.image.at<uchar>(v, u) == 0;
+      fine.at<uchar>(y, x) = is_ink ? 25 : 200;
+    }
+  }
+  cv::Mat image;
+  cv::resize(fine, image, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
+  return image;
+}
+
+}  // namespace
+
+Imager example_camera() {
+  Imager camera{"camera0", 640, 480, {}, Pose()};
+  camera.lens = Lens::create("LENSMODEL_OPENCV4", {700, 700, 322, 238, -0.1, 0.05, 0, 0}).value();
+  return camera;
+}
+
+Body example_body() {
+  Body body{"body", {}};
+  for (const int i : {0, 1})
+    body.markers.push_back({{"apriltag_36h11", std::to_string(i)},
+                            0.08,
+                            Pose(Eigen::Quaterniond::Identity(), Vector3d(i == 0 ? -0.06 : 0.06, 0, 0))});
+  return body;
+}
+
+Pose world_from_example_body(int i) {
+  return {exp_rotation({0.5, 0.2, 0.02 * i}), Vector3d(-0.03 + 0.005 * i, 0.01, 0.7)};
+}
+
+cv::Mat example_image(int i) {
+  const Imager camera = example_camera();
+  std::vector<PlacedMarker> placed;
+  for (const BodyMarker& marker : example_body().markers) {
+    PlacedMarker one;
+    one.marker = marker.marker;
+    one.camera_from_marker = world_from_example_body(i) * marker.body_from_marker;
+    one.size_m = marker.size_m;
+    placed.push_back(one);
+  }
+  const cv::Mat background(camera.height, camera.width, CV_8U, cv::Scalar(120));
+  std::mt19937_64 rng(static_cast<unsigned>(i));
+  return image_of(camera.lens, background, placed, {.blur_px = 0.5, .noise_levels = 1}, rng);
+}
+
+Rig example_rig() {
+  Rig rig;
+  rig.cameras = {example_camera()};
+  rig.cameras[0].imager_from_world = looking_at({0.1, 0.1, 1.2}, {0, 0, 0}, {0, 1, 0});
+  rig.projectors = {rig.cameras[0]};
+  rig.projectors[0].name = "projector0";
+  rig.projectors[0].imager_from_world = looking_at({-0.3, 0.2, 1.1}, {0, 0, 0}, {0, 1, 0});
+  return rig;
+}
+
+void write_example_video(const std::filesystem::path& folder, int count) {
+  expect(make_folder(folder));
+  expect(save_cameramodel(example_camera(), folder / "camera0.cameramodel"));
+  expect(write_file(folder / "body.json", scene::marker_file_json(example_body().markers)));
+  for (int i = 0; i < count; ++i) expect(write_png(folder / fmt::format("image{}.png", i), example_image(i)));
+}
+
+void write_example_photographs(const std::filesystem::path& folder, int count) {
+  expect(make_folder(folder));
+  const calib::Board board = calib::Board::parse(k_example_board).value();
+  const calib::BoardSheet sheet = calib::draw_board(board, {.square_px = 48});
+  const Pose middle(Eigen::Quaterniond::Identity(), Vector3d(-board.width_m() / 2, -board.height_m() / 2, 0));
+  for (int i = 0; i < count; ++i) {
+    const double around = 2.2 * i;
+    const Pose camera_from_board(exp_rotation({0.45 * std::cos(around), 0.45 * std::sin(around), 0.1 * i}),
+                                 Vector3d(0.05 * std::sin(around), 0.03 * std::cos(around), 0.6 + 0.02 * i));
+    expect(write_png(folder / fmt::format("photo{}.png", i),
+                     photograph(example_camera(), sheet, camera_from_board * middle)));
+  }
+}
+
+void write_example_scene(const std::filesystem::path& folder) {
+  expect(save_rig(example_rig(), folder / "rig"));
+  const Pose world_from_part(Eigen::Quaterniond::Identity(), Vector3d(0, 0, 0.05));
+  const nlohmann::json poses = {
+      {"world_from_prototype", to_json(Pose())},
+      {"slots", {{"mirror", {{"world_from_part", to_json(world_from_part)}, {"variant", "sport"}}}}}};
+  expect(write_file(folder / "poses.json", poses.dump()));
+}
+
+}  // namespace limn::test

@@ -1,0 +1,50 @@
+#!/usr/bin/env bash
+# installed.sh CMAKE BUILD SOURCE INPUTS COMPILER: installs the library into a folder of its own, builds the examples against
+# it with find_package and one with pkg-config, and runs them.
+set -euo pipefail
+cmake="$1" build="$2" source="$3" inputs="$4" compiler="$5"
+folder="$(mktemp -d)"
+trap 'rm -rf "$folder"' EXIT
+fail() { echo "$1" >&2; exit 1; }
+# prints WORDS COMMAND…: runs the command and expects the words in what it prints.
+prints() {
+  local words="$1" text
+  shift
+  text="$("$@" 2>&1)" || fail "$* ended with $?: $text"
+  [[ "$text" == *"$words"* ]] || fail "$*: expected '$words', found: $text"
+}
+
+for component in library development; do
+  "$cmake" --install "$build" --prefix "$folder/first" --component "$component" >"$folder/log" || fail "$(cat "$folder/log")"
+done
+mv "$folder/first" "$folder/prefix" # an installed tree can be moved
+
+exported="$(find "$folder/prefix" -name 'liblimn.so.0' -exec nm -DC --defined-only {} +)"
+foreign="$(grep ' T ' <<<"$exported" | grep -v 'limn::v0_' || true)"
+[ -z "$foreign" ] || fail "liblimn.so: expected only functions of limn::v0_…, found: $(head -5 <<<"$foreign")"
+
+"$cmake" -S "$source/examples" -B "$folder/build" -DCMAKE_PREFIX_PATH="$folder/prefix" -DCMAKE_CXX_COMPILER="$compiler" \
+  -DCMAKE_BUILD_TYPE=Debug >"$folder/log" 2>&1 || fail "$(cat "$folder/log")"
+"$cmake" --build "$folder/build" >"$folder/log" 2>&1 || fail "$(cat "$folder/log")"
+! grep -q warning "$folder/log" || fail "$(cat "$folder/log")"
+
+"$inputs" "$folder/in"
+video="$folder/in/video"
+cd "$folder"
+prints "apriltag_36h11:1" build/detect "$video/image0.png" apriltag_36h11 "$video/camera0.cameramodel" 80
+prints "standard deviation in depth" build/detect "$video/image0.png" apriltag_36h11 "$video/camera0.cameramodel" 80
+prints "by 2 markers" build/track "$video/camera0.cameramodel" "$video/body.json" 30 "$video"/image?.png
+prints "back within" build/camera_files "$video/camera0.cameramodel" "$folder/camera"
+[ -s camera.yml ] && [ -s camera_ros.yaml ] || fail "camera_files: expected camera.yml and camera_ros.yaml."
+prints "held-out" build/calibrate in/photographs rig charuco:8x6:40mm
+[ -s rig/report.html ] || fail "calibrate: expected rig/report.html."
+prints "Mesa" build/project in/rig "$source/config/scenes/door" in/poses.json images
+[ -s images/projector-projector0.png ] && [ -s images/composite-camera0.png ] || fail "project: expected images."
+if build/detect "$folder/none.png" apriltag_36h11 2>error; then fail "detect: expected an error without an image."; fi
+grep -q none.png error || fail "detect: expected the file's name, found: $(cat error)"
+
+pc="$(dirname "$(find prefix -name limn.pc)")"
+# shellcheck disable=SC2046 # several words
+"$compiler" "$source/examples/detect.cpp" -o by_pkg_config \
+  $(PKG_CONFIG_PATH="$pc" pkg-config --cflags --libs limn) -Wl,-rpath,"$folder/$(dirname "$pc")"
+prints "apriltag_36h11:0" ./by_pkg_config "$video/image0.png" apriltag_36h11
