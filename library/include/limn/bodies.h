@@ -48,7 +48,7 @@ struct Track {
   Pose world_from_body = {};
   Covariance6 covariance = {};
   int marker_count = 0;
-  double rms_px = 0;         ///< of the markers' corners
+  double rms_px = 0;         ///< residual of the markers' corners
   double captured_at_s = 0;  ///< when the newest image that showed the body was taken
   double at_s = 0;           ///< the moment of the pose
   Tracking tracking = Tracking::measured;
@@ -60,9 +60,9 @@ LIMN_API std::vector<Track> locate_bodies(std::span<const Body> bodies, std::spa
 
 /// How bodies are expected to move. The defaults suit a hand.
 struct Motion {
-  double jerk = 3;                     ///< of a moving body, m²/s⁵; higher follows sooner and jitters more
-  double turn_jerk = 50;               ///< rad²/s⁵
-  double drift = 0.05e-3;              ///< of a body that stands, m per square root of a second
+  double jerk = 3;         ///< white jerk of a moving body, m²/s⁵; higher follows sooner and jitters more
+  double turn_jerk = 50;   ///< rad²/s⁵
+  double drift = 0.05e-3;  ///< random walk of a body that stands, m per square root of a second
   double turn_drift = 0.9e-3;          ///< rad per square root of a second
   double starts_per_s = 0.5;           ///< how often a still body begins to move
   double stops_per_s = 1;              ///< how often a moving one comes to rest

@@ -27,7 +27,7 @@ struct SolveOptions {
   std::string board_measured = {};
   std::vector<std::string> scale_bars =
       {};  ///< `apriltag_36h11:3 apriltag_36h11:7 250mm`, beside those of the captures
-  std::vector<std::string> families = {"apriltag_36h11"};  ///< of markers that stand in the scene
+  std::vector<std::string> families = {"apriltag_36h11"};  ///< families of markers that stand in the scene
   bool pixels_not_square = false;                          ///< images that were stretched
   ReportProgress progress = {};  ///< stages: images, response, decode, solve, assess, write
 };
@@ -102,9 +102,9 @@ struct ScanOptions {
   bool moved = false;                   ///< the prototype stood in another place in every pose
   int pieces = 0;                       ///< keeps this many of the largest pieces of each view; 0: all
   double near_m = 0, far_m = 0;         ///< distances from the camera that count; far_m 0: no limit
-  double voxel_m = 0;                   ///< of the mesh; 0: one and a half times the distance of points
-  int smooth_px = 3;                    ///< smoothing of each view's depth
-  ReportProgress progress = {};         ///< stages: scan, merge, write
+  double voxel_m = 0;            ///< the mesh's resolution; 0: one and a half times the distance of points
+  int smooth_px = 3;             ///< smoothing of each view's depth
+  ReportProgress progress = {};  ///< stages: scan, merge, write
 };
 
 struct Scan {
