@@ -19,7 +19,7 @@ struct Marker {
   /// Top-left, top-right, bottom-right and bottom-left corner of the black square as the marker stands
   /// upright; pixels of the raw image.
   std::array<Point2, 4> corners_px = {};
-  std::array<std::array<double, 4>, 4> corner_covariances = {};  ///< each 2 x 2, px², 2 x 2 row by row
+  std::array<std::array<double, 4>, 4> corner_covariances = {};  ///< each 2 x 2, row by row, px²
   /// False where a corner itself is covered and follows from the visible parts of its two sides.
   std::array<bool, 4> corner_visible = {true, true, true, true};
   double score = 0;  ///< probability that the id is right, 0.9 … 1

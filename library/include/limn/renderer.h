@@ -39,7 +39,7 @@ struct Viewpoint {
 struct PosedScene {
   std::optional<Pose> world_from_prototype = {};  ///< none: not seen
   std::vector<PosedPart> parts = {};              ///< those that are seen
-  std::vector<Viewpoint> viewpoints = {};         ///< of the scene's viewers that are seen
+  std::vector<Viewpoint> viewpoints = {};         ///< the scene's viewers that are seen
 };
 
 /// The prototype and the parts of a scene.json, with the files that it names. It does not change, and a
