@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -17,7 +18,11 @@ namespace {
 
 namespace api = LIMN_VERSIONED;
 
+#define LIMN_TEXT_(words) #words
+#define LIMN_TEXT(words) LIMN_TEXT_(words)
+
 TEST(Library, HasTheVersionOfTheBuild) {
+  EXPECT_EQ(LIMN_TEXT(LIMN_VERSIONED), fmt::format("v{}_{}", LIMN_VERSION_MAJOR, LIMN_VERSION_MINOR));
   EXPECT_EQ(api::version(), version());
   EXPECT_EQ(LIMN_VERSION_TEXT, version());
   EXPECT_EQ(fmt::format("{}.{}.{}", LIMN_VERSION_MAJOR, LIMN_VERSION_MINOR, LIMN_VERSION_PATCH), version());
