@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <mutex>
 #include <utility>
 
@@ -17,8 +18,8 @@ namespace limn {
 namespace {
 
 std::atomic<LogLevel> g_level{LogLevel::info};
-std::mutex g_stderr;  // also guards the sink
-LogSink g_sink;
+std::mutex g_stderr, g_sink_mutex;
+std::shared_ptr<const LogSink> g_sink;
 
 double now_s() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
@@ -49,16 +50,17 @@ void write_line(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stderr);
 }
 
-// Gives the line to the sink; false if there is none.
-bool is_taken_by_sink(LogLevel level, const std::string& line) {
-  const std::lock_guard lock(g_stderr);
-  if (g_sink) g_sink(level, line);
-  return static_cast<bool>(g_sink);
+std::shared_ptr<const LogSink> current_sink() {
+  const std::lock_guard lock(g_sink_mutex);
+  return g_sink;
 }
 
-bool has_sink() {
-  const std::lock_guard lock(g_stderr);
-  return static_cast<bool>(g_sink);
+// Gives the line to the sink; false if there is none. No lock is held while the sink runs: it may wait for
+// another thread that logs.
+bool is_taken_by_sink(LogLevel level, const std::string& line) {
+  const auto sink = current_sink();
+  if (sink) (*sink)(level, line);
+  return sink != nullptr;
 }
 
 }  // namespace
@@ -66,8 +68,9 @@ bool has_sink() {
 void set_log_level(LogLevel level) { g_level = level; }
 
 void set_log_sink(LogSink sink) {
-  const std::lock_guard lock(g_stderr);
-  g_sink = std::move(sink);
+  auto next = sink ? std::make_shared<const LogSink>(std::move(sink)) : nullptr;
+  const std::lock_guard lock(g_sink_mutex);
+  g_sink.swap(next);  // so that the old one is destroyed after the lock
 }
 
 void log_line(LogLevel level, const std::string& line) {
@@ -89,7 +92,7 @@ void Progress::step(int done) {
   const bool terminal = isatty(STDERR_FILENO) != 0;
   const double every = terminal ? k_terminal_every_s : k_file_every_s;
   if (g_level.load() < LogLevel::info || now - started_s_ < k_silent_s || now - printed_s_ < every ||
-      has_sink())
+      current_sink())
     return;
   printed_s_ = now;
   write_line(fmt::format("{}{} {}/{} ({:.0f} s){}",
@@ -99,7 +102,7 @@ void Progress::step(int done) {
 
 Progress::~Progress() {
   const double seconds = now_s() - started_s_;
-  if (g_level.load() < LogLevel::info || seconds < k_silent_s || has_sink()) return;
+  if (g_level.load() < LogLevel::info || seconds < k_silent_s || current_sink()) return;
   write_line(fmt::format("{}{} {}/{} ({:.1f} s)\n",
                          isatty(STDERR_FILENO) ? std::string("\r\033[K") : journal_prefix(k_journal_info),
                          what_, done_, total_, seconds));

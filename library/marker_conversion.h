@@ -5,7 +5,7 @@
 
 namespace limn::LIMN_VERSIONED {
 
-/// What body poses need of a marker.
+/// What body poses need of a marker. Error: a corner's covariance that is none.
 limn::tracker::Detection detection_of(const Marker& marker);
 
 }  // namespace limn::LIMN_VERSIONED

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "library/convert.h"
@@ -34,6 +36,12 @@ Marker to_public(const limn::tracker::Detection& detection) {
   return marker;
 }
 
+bool is_covariance(const std::array<double, 4>& c) {
+  const bool is_finite =
+      std::isfinite(c[0]) && std::isfinite(c[1]) && std::isfinite(c[2]) && std::isfinite(c[3]);
+  return is_finite && c[0] > 0 && c[3] > 0 && c[0] * c[3] > c[1] * c[2];
+}
+
 }  // namespace
 
 limn::tracker::Detection detection_of(const Marker& marker) {
@@ -43,6 +51,12 @@ limn::tracker::Detection detection_of(const Marker& marker) {
   detection.score = marker.score;
   for (std::size_t i = 0; i < 4; ++i) {
     const auto& c = marker.corner_covariances[i];
+    if (!is_covariance(c))
+      throw Error(
+          fmt::format("marker {}:{}, corner {}: expected a covariance of its pixel (positive definite, px²), "
+                      "found {}, {}, "
+                      "{}, {}. Keep the default of 0.2 px where it is not known.",
+                      marker.family, marker.id, i, c[0], c[1], c[2], c[3]));
     detection.corners_px[i] = LIMN_VERSIONED::to_room(marker.corners_px[i]);
     detection.corner_covariance[i] << c[0], c[1], c[2], c[3];
   }

@@ -2,13 +2,16 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "core/log.h"
 #include "core/names.h"
-#include "device/gl_context.h"
 #include "library/body_conversion.h"
 #include "library/convert.h"
+#include "library/current_context.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
@@ -105,46 +108,67 @@ Imager Scene::viewer(const PosedScene& posed, const Rig& rig) const {
   return LIMN_VERSIONED::to_public(cameras[0]);
 }
 
-struct Renderer::Impl {
-  // In this order: what is in the context ends before it.
-  std::optional<limn::device::GlContext> context;
-  std::optional<limn::projector::Renderer> renderer;
-  std::shared_ptr<const Scene::Impl> scene;
-  limn::Rig rig;
-  limn::tracker::MarkerLight marker_light = limn::tracker::MarkerLight::as_is;
-  std::string gl_description;
+namespace {
 
-  Impl() = default;
+void check_size(const char* what, int width, int height) {
+  if (width < 1 || height < 1 || std::max(width, height) > limn::k_max_side)
+    throw Error(fmt::format("renderer: expected {} with a size of 1 to {} pixels a side, found {}x{}.", what,
+                            limn::k_max_side, width, height));
+}
+
+}  // namespace
+
+struct Renderer::Impl {
+  std::optional<OwnContext> context;
+  std::unique_ptr<limn::projector::Renderer> renderer;
+  Scene scene;
+  Rig rig;
+  limn::tracker::MarkerLight marker_light = limn::tracker::MarkerLight::as_is;
+  std::string gl_description = {};
+
+  Impl(const Scene& drawn, const Rig& drawn_for) : scene(drawn), rig(drawn_for) {}
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
-  ~Impl() { make_current(); }
 
-  void make_current() const {
-    if (context) context->make_current();
+  // What is in the context ends in it. Where it cannot be current (another thread draws with it), that
+  // memory is lost, which is better than to end objects of the caller's context with the same numbers.
+  ~Impl() {
+    try {
+      const OwnContext::Scope scope = current();
+      renderer.reset();
+    } catch (const std::exception&) {
+      static_cast<void>(renderer.release());
+    }
   }
 
-  limn::scene::PosedScene room_of(const PosedScene& posed) const { return to_room(posed, scene->scene); }
+  // The headless context is current as long as the result exists.
+  OwnContext::Scope current() const { return OwnContext::Scope(context ? &*context : nullptr); }
+
+  const limn::scene::Scene& room_scene() const { return scene.impl().scene; }
+  limn::scene::PosedScene room_of(const PosedScene& posed) const { return to_room(posed, room_scene()); }
 
   const limn::Imager& projector(std::size_t index) const {
-    if (index < rig.projectors.size()) return rig.projectors[index];
-    throw Error(fmt::format("renderer: expected a projector below {} ({}), found {}.", rig.projectors.size(),
-                            limn::joined_names(rig.projectors), index));
+    const auto& projectors = LIMN_VERSIONED::to_room(rig).projectors;
+    if (index < projectors.size()) return projectors[index];
+    throw Error(fmt::format("renderer: expected a projector below {} ({}), found {}.", projectors.size(),
+                            limn::joined_names(projectors), index));
   }
 
   const limn::Imager& camera(std::size_t index) const {
-    if (index < rig.cameras.size()) return rig.cameras[index];
-    throw Error(fmt::format("renderer: expected a camera below {} ({}), found {}.", rig.cameras.size(),
-                            limn::joined_names(rig.cameras), index));
+    const auto& cameras = LIMN_VERSIONED::to_room(rig).cameras;
+    if (index < cameras.size()) return cameras[index];
+    throw Error(fmt::format("renderer: expected a camera below {} ({}), found {}.", cameras.size(),
+                            limn::joined_names(cameras), index));
   }
 
   cv::Mat projector_image(std::size_t index, const PosedScene& posed, const Imager& viewer) {
     const limn::Imager& shown_by = projector(index);
     const limn::scene::PosedScene room = room_of(posed);
-    make_current();
+    const OwnContext::Scope scope = current();
     const cv::Mat image = renderer->projector_image(index, room, LIMN_VERSIONED::to_room(viewer));
     if (marker_light == limn::tracker::MarkerLight::as_is) return image;
-    const cv::Mat mask = limn::tracker::marker_mask(shown_by, limn::scene::bodies(scene->scene),
-                                                    limn::scene::tracks_of(scene->scene, room));
+    const cv::Mat mask = limn::tracker::marker_mask(shown_by, limn::scene::bodies(room_scene()),
+                                                    limn::scene::tracks_of(room_scene(), room));
     return limn::tracker::with_marker_light(image, mask, marker_light);
   }
 
@@ -155,7 +179,7 @@ struct Renderer::Impl {
                               taken_by.width, taken_by.height, image.width, image.height));
     const cv::Mat behind = bgr_or_grey_of(image);
     const limn::scene::PosedScene room = room_of(posed);
-    make_current();
+    const OwnContext::Scope scope = current();
     return renderer->composite(
         index, behind, room,
         what == Composite::full ? limn::projector::Composite::full : limn::projector::Composite::rest);
@@ -179,15 +203,18 @@ limn::tracker::MarkerLight to_room(MarkerLight how) {
 }  // namespace
 
 Renderer::Renderer(const Scene& scene, const Rig& rig, const RendererOptions& options)
-    : impl_(std::make_unique<Impl>()) {
-  impl_->scene = std::make_shared<const Scene::Impl>(scene.impl());
-  impl_->rig = LIMN_VERSIONED::to_room(rig);
+    : impl_(std::make_unique<Impl>(scene, rig)) {
   impl_->marker_light = to_room(options.marker_light);
+  const limn::Rig& room_rig = LIMN_VERSIONED::to_room(rig);
+  for (const limn::Imager& projector : room_rig.projectors)
+    check_size(("projector '" + projector.name + "'").c_str(), projector.width, projector.height);
   if (options.context == GlContext::headless) {
-    impl_->context.emplace(value_of(limn::device::GlContext::create()));
+    impl_->context.emplace();
     impl_->gl_description = impl_->context->description();
   }
-  impl_->renderer.emplace(value_of(limn::projector::Renderer::create(impl_->scene->scene, impl_->rig)));
+  const OwnContext::Scope scope = impl_->current();
+  impl_->renderer = std::make_unique<limn::projector::Renderer>(
+      value_of(limn::projector::Renderer::create(impl_->room_scene(), room_rig)));
   limn::projector::LightOptions light;
   if (options.compensate_geometry) light.compensation = limn::projector::Compensation::geometry;
   light.even_black = options.even_black;
@@ -215,9 +242,11 @@ unsigned Renderer::draw_projector_texture(std::size_t projector,
                                           const PosedScene& posed,
                                           const Imager& viewer) {
   impl_->projector(projector);
-  const limn::scene::PosedScene room = impl_->room_of(posed);
-  impl_->make_current();
-  return impl_->renderer->draw_projector(projector, room, LIMN_VERSIONED::to_room(viewer));
+  if (impl_->context)
+    throw Error(
+        "renderer: a texture of the headless context cannot be used elsewhere. Create the renderer in your "
+        "context (GlContext::current), or call draw_projector.");
+  return impl_->renderer->draw_projector(projector, impl_->room_of(posed), LIMN_VERSIONED::to_room(viewer));
 }
 
 Image Renderer::draw_composite(std::size_t camera,
@@ -236,8 +265,9 @@ void Renderer::draw_composite(std::size_t camera,
 }
 
 Image Renderer::draw_view(const Imager& camera, const PosedScene& posed) {
+  check_size("a camera", camera.width(), camera.height());
   const limn::scene::PosedScene room = impl_->room_of(posed);
-  impl_->make_current();
+  const OwnContext::Scope scope = impl_->current();
   const cv::Scalar background(40, 36, 34);  // a dark room, as limn render --view draws it
   return rgb_of(impl_->renderer->view(LIMN_VERSIONED::to_room(camera), room, background));
 }

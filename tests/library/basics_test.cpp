@@ -4,10 +4,15 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <thread>
+#include <vector>
 
+#include "core/log.h"
 #include "core/pose.h"
 #include "core/version.h"
 #include "library/convert.h"
+#include "limn/error.h"
 #include "limn/image.h"
 #include "limn/pose.h"
 #include "limn/version.h"
@@ -68,6 +73,19 @@ TEST(LibraryImage, ThatCannotBeIsRefused) {
   EXPECT_THROW(api::write_png(file, {bytes.data(), 2, 1, 5, api::PixelFormat::rgb}), api::Error);
   EXPECT_THROW(api::write_png(file, {}), api::Error);
   EXPECT_THROW(api::read_image(file), api::Error);
+}
+
+// A sink that waits for another thread that logs, as one does that needs Python's lock.
+TEST(LibraryLog, MayWaitForAThreadThatLogs) {
+  std::vector<std::string> lines;
+  api::set_log([&](bool is_warning, const std::string& line) {
+    lines.push_back(line);
+    if (is_warning) std::thread([] { log_info("from another thread"); }).join();
+  });
+  log_warning("from the first");
+  api::set_log({});
+  log_warning("after it");
+  EXPECT_EQ(lines, (std::vector<std::string>{"from the first", "from another thread"}));
 }
 
 }  // namespace

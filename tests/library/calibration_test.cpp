@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "library/convert.h"
@@ -67,6 +68,43 @@ TEST(LibrarySolve, AFailureIsNotAStop) {
   } catch (const api::Error& error) {
     EXPECT_NE(std::string(error.what()).find("none"), std::string::npos) << error.what();
   }
+}
+
+// The triangles of the scan and the pose of its mesh, from captures of a surface whose height is known.
+TEST(LibraryScan, MeasuresASurfaceAndFindsItsMesh) {
+  const fs::path folder = test::test_folder();
+  test::write_example_scan(folder);
+  std::vector<std::string> stages;
+  api::ScanOptions options;
+  options.progress = [&](const api::Progress& progress) { return stages.push_back(progress.stage), true; };
+  const api::Scan scan =
+      api::scan(folder / "captures", api::Rig::load(folder / "rig"), folder / "scan", options);
+  EXPECT_EQ(stages, (std::vector<std::string>{"scan", "merge", "write"}));
+  const auto positions = scan.points.positions();
+  ASSERT_GT(positions.size(), 3U * 10000);
+  EXPECT_EQ(scan.points.normals().size(), positions.size());
+  EXPECT_EQ(3 * scan.points.stddevs().size(), positions.size());
+  EXPECT_FALSE(scan.mesh.triangles().empty());
+  const Pose surface_from_world = test::world_from_example_surface().inverse();
+  double squares = 0;
+  for (std::size_t i = 0; i < positions.size(); i += 3) {
+    const Eigen::Vector3f p_world(positions[i], positions[i + 1], positions[i + 2]);
+    const Eigen::Vector3d p = surface_from_world * p_world.cast<double>();
+    squares += std::pow(p.z() - test::example_height(p.x(), p.y()), 2);
+  }
+  EXPECT_LT(std::sqrt(3 * squares / static_cast<double>(positions.size())), 0.5e-3);
+
+  api::AlignOptions aligning;
+  aligning.mesh_unit = api::Unit::metre;
+  aligning.start = folder / "start.json";
+  const api::Alignment aligned =
+      api::align(folder / "scan", folder / "surface.ply", folder / "aligned", aligning);
+  const Pose error =
+      test::world_from_example_surface().inverse() * api::to_room(aligned.world_from_prototype);
+  EXPECT_LT(error.translation.norm(), 0.5e-3);
+  EXPECT_GT(aligned.used_points, 500);
+  EXPECT_GT(aligned.scan_share, 0.9);
+  EXPECT_TRUE(fs::exists(folder / "aligned/poses.json"));
 }
 
 TEST(LibraryScan, SaysWhatItRefuses) {

@@ -8,13 +8,17 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 #include <stdexcept>
+#include <tuple>
 
 #include "calib/board/board.h"
+#include "calib/capture.h"
+#include "calib/capture_set.h"
 #include "core/cameramodel.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"
 #include "scene/marker_file.h"
+#include "scene/scan_surface.h"
 #include "tests/tracker/marker_images.h"
 
 namespace limn::test {
@@ -47,6 +51,60 @@ cv::Mat photograph(const Imager& camera, const calib::BoardSheet& sheet, const P
   cv::Mat image;
   cv::resize(fine, image, {camera.width, camera.height}, 0, 0, cv::INTER_AREA);
   return image;
+}
+
+constexpr double k_half_width_m = 0.25, k_half_height_m = 0.18;  // of the surface that is scanned
+
+// A camera and a projector of 320 x 240 pixels that look down on the surface.
+Rig scan_rig() {
+  Rig rig;
+  for (auto& [name, imagers, p_eye] : {std::tuple{"camera0", &rig.cameras, Vector3d(0.15, 0.1, 1)},
+                                       std::tuple{"projector0", &rig.projectors, Vector3d(-0.25, 0.1, 1)}}) {
+    imagers->push_back(
+        {name, 320, 240, Lens::create("LENSMODEL_PINHOLE", {500, 500, 160, 120}).value(), Pose()});
+    imagers->back().imager_from_world = looking_at(p_eye, {0, 0, 0}, {0, 1, 0});
+  }
+  return rig;
+}
+
+// For each pixel of the camera the projector's pixel that lights what it sees; far outside where it sees
+// nothing.
+cv::Mat lit_by(const Imager& camera, const Imager& projector) {
+  const Pose surface_from_world = world_from_example_surface().inverse();
+  cv::Mat map(camera.height, camera.width, CV_32FC2, cv::Scalar(-1e4, -1e4));
+  for (int y = 0; y < map.rows; ++y) {
+    for (int x = 0; x < map.cols; ++x) {
+      const Ray ray = *camera.ray(Vector2d(x, y));
+      const Vector3d p_begin = surface_from_world * ray.p_origin, d = surface_from_world.rotation * ray.d;
+      Vector3d p = p_begin;
+      for (int i = 0; i < 20; ++i) p += (example_height(p.x(), p.y()) - p.z()) / d.z() * d;
+      const auto px = projector.project(world_from_example_surface() * p);
+      if (px && std::abs(p.x()) < k_half_width_m && std::abs(p.y()) < k_half_height_m)
+        map.at<cv::Vec2f>(y, x) = cv::Vec2f(static_cast<float>(px->x()), static_cast<float>(px->y()));
+    }
+  }
+  return map;
+}
+
+// The surface's mesh, with a vertex each 5 mm.
+scene::ScanSurface surface_mesh() {
+  constexpr int k_columns = 101, k_rows = 73;
+  scene::ScanSurface mesh;
+  for (int y = 0; y < k_rows; ++y) {
+    for (int x = 0; x < k_columns; ++x) {
+      const double u = k_half_width_m * (2.0 * x / (k_columns - 1) - 1);
+      const double v = k_half_height_m * (2.0 * y / (k_rows - 1) - 1);
+      mesh.positions.push_back(Vector3d(u, v, example_height(u, v)).cast<float>());
+    }
+  }
+  for (std::uint32_t y = 0; y + 1 < k_rows; ++y) {
+    for (std::uint32_t x = 0; x + 1 < k_columns; ++x) {
+      const std::uint32_t i = y * k_columns + x;
+      mesh.triangles.push_back({i, i + 1, i + k_columns});
+      mesh.triangles.push_back({i + 1, i + k_columns + 1, i + k_columns});
+    }
+  }
+  return mesh;
 }
 
 }  // namespace
@@ -123,6 +181,40 @@ void write_example_scene(const std::filesystem::path& folder) {
       {"world_from_prototype", to_json(Pose())},
       {"slots", {{"mirror", {{"world_from_part", to_json(world_from_part)}, {"variant", "sport"}}}}}};
   expect(write_file(folder / "poses.json", poses.dump()));
+}
+
+Pose world_from_example_surface() { return {exp_rotation({0, 0.05, 0}), Vector3d(0.02, -0.01, 0.03)}; }
+
+double example_height(double x, double y) {
+  return 0.03 * std::sin(9 * x + 0.5) * std::cos(7 * y - 0.3) + 0.02 * std::exp(-150 * (x * x + y * y));
+}
+
+void write_example_scan(const std::filesystem::path& folder) {
+  const Rig rig = scan_rig();
+  expect(save_rig(rig, folder / "rig"));
+  expect(scene::save_ply(surface_mesh(), folder / "surface.ply"));
+  Pose start = world_from_example_surface();
+  start.translation += Vector3d(0.006, -0.006, 0.006);
+  expect(write_file(folder / "start.json", nlohmann::json{{"world_from_prototype", to_json(start)}}.dump()));
+
+  const calib::CaptureSet plan =
+      calib::plan_captures(folder / "captures", {{"camera0", 320, 240}}, {{"projector0", 320, 240}},
+                           calib::Board::parse(k_example_board).value());
+  expect(calib::begin_captures(plan));
+  const cv::Mat map = lit_by(rig.cameras[0], rig.projectors[0]);
+  cv::Mat shown;
+  expect(calib::capture_pose(plan, 0,
+                             {.show =
+                                  [&](int, const cv::Mat& image) {
+                                    shown = image;
+                                    return Status();
+                                  },
+                              .grab = [&](int) -> Result<cv::Mat> {
+                                cv::Mat light, image;
+                                cv::remap(shown, light, map, {}, cv::INTER_LINEAR, cv::BORDER_CONSTANT);
+                                light.convertTo(image, CV_8U, 0.8, 20);
+                                return image;
+                              }}));
 }
 
 }  // namespace limn::test

@@ -28,5 +28,12 @@ void write_example_video(const std::filesystem::path& folder, int count);
 void write_example_photographs(const std::filesystem::path& folder, int count);
 /// rig/ of example_rig(), and poses.json for config/scenes/door.
 void write_example_scene(const std::filesystem::path& folder);
+/// captures/ of a curved surface of half a metre without noise, rig/ of its camera and projector, surface.ply
+/// (m, the prototype's frame), and start.json, which is a centimetre off.
+void write_example_scan(const std::filesystem::path& folder);
+/// Where the surface stands in the rig's world.
+Pose world_from_example_surface();
+/// Its height at a point of its frame, m.
+double example_height(double x, double y);
 
 }  // namespace limn::test

@@ -72,6 +72,17 @@ TEST(LibraryDetector, SaysWhatItRefuses) {
   EXPECT_THROW(detector.detect(view_of(small), &imager), api::Error);
 }
 
+TEST(LibraryMarkers, CornersOfAnotherDetectorGiveAPose) {
+  const api::Imager imager = api::to_public(test::example_camera());
+  api::Marker marker{.family = "apriltag_36h11", .id = "0"};
+  const auto found = api::Detector({"apriltag_36h11"}).detect(view_of(test::example_image(0)));
+  ASSERT_FALSE(found.empty());
+  marker.corners_px = found[0].corners_px;
+  EXPECT_FALSE(api::marker_poses(marker, 0.08, imager).empty());
+  marker.corner_covariances[2] = {0, 0, 0, 0};
+  EXPECT_THROW(api::marker_poses(marker, 0.08, imager), api::Error);
+}
+
 TEST(LibraryMarkers, ADrawnMarkerIsFound) {
   const api::Image drawn = api::draw_marker("aruco_4x4_50", "7");
   const auto found = api::Detector({"aruco_4x4_50"}).detect(drawn.view());

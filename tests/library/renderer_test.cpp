@@ -1,9 +1,12 @@
 #include "limn/renderer.h"
 
+#include <epoxy/egl.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
+#include <optional>
+#include <thread>
 
 #include "device/gl_context.h"
 #include "library/convert.h"
@@ -71,6 +74,23 @@ TEST_F(LibraryRenderer, DrawsInTheCallersContext) {
   EXPECT_EQ(renderer.gl_description(), "");
 }
 
+TEST_F(LibraryRenderer, LeavesTheThreadsContextAndMayBeUsedByAnotherThread) {
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  const void* const before = eglGetCurrentContext();
+  const api::Rig rig = api::Rig::load(folder / "rig");
+  const api::PosedScene posed = scene.load_poses(folder / "poses.json");
+  std::optional<api::Renderer> renderer(std::in_place, scene, rig);
+  const api::Image here = renderer->draw_view(rig.cameras()[0], posed);
+  EXPECT_EQ(eglGetCurrentContext(), before);
+  std::thread([&] {
+    EXPECT_EQ(renderer->draw_view(rig.cameras()[0], posed).pixels, here.pixels);
+    renderer.reset();
+    EXPECT_EQ(eglGetCurrentContext(), EGL_NO_CONTEXT);
+  }).join();
+  EXPECT_EQ(eglGetCurrentContext(), before);
+}
+
 TEST_F(LibraryRenderer, SaysWhatItRefuses) {
   const api::Rig rig = api::Rig::load(folder / "rig");
   api::PosedScene posed = scene.load_poses(folder / "poses.json");
@@ -80,6 +100,10 @@ TEST_F(LibraryRenderer, SaysWhatItRefuses) {
   api::Image small{.pixels = std::vector<std::uint8_t>(300), .width = 10, .height = 10};
   EXPECT_THROW(renderer.draw_projector(0, posed, viewer, small.view()), api::Error);
   EXPECT_THROW(renderer.draw_composite(0, small.view(), posed, api::Composite::rest), api::Error);
+  EXPECT_THROW(renderer.draw_projector_texture(0, posed, viewer), api::Error);
+  EXPECT_THROW(renderer.draw_view(api::Imager(api::ImagerParts{.name = "no size"}), posed), api::Error);
+  const std::vector<api::Imager> without_size = {api::Imager(api::ImagerParts{.name = "no size"})};
+  EXPECT_THROW(api::Renderer(scene, api::Rig({}, without_size)), api::Error);
   posed.parts[0].variant = "none";
   EXPECT_THROW(renderer.draw_projector(0, posed, viewer), api::Error);
   EXPECT_THROW(api::Scene::load(folder / "none"), api::Error);

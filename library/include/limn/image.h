@@ -1,5 +1,6 @@
 #pragma once
 
+/// Images: views on memory of the caller, and images with memory of their own.
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include "limn/export.h"
 
 namespace limn::LIMN_VERSIONED {
+
 enum class PixelFormat { grey, rgb, bgr };
 
 /// An image in the caller's memory, 8 bits a channel, first row first. Nothing is copied or kept after the

@@ -1,10 +1,12 @@
 #pragma once
 
+/// Points, poses and their covariances.
 #include <array>
 
 #include "limn/export.h"
 
 namespace limn::LIMN_VERSIONED {
+
 /// Pixels: (0, 0) is the CENTRE of the top-left pixel; x right, y down.
 using Point2 = std::array<double, 2>;
 /// Metres, or a direction.
