@@ -11,7 +11,7 @@
 #include "core/names.h"
 #include "library/body_conversion.h"
 #include "library/convert.h"
-#include "library/current_context.h"
+#include "library/own_context.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"

@@ -31,15 +31,28 @@ void expect(const Status& status) {
   if (!status) throw std::runtime_error(status.message());
 }
 
-// The board as the camera sees it, with nine rays for each pixel.
-cv::Mat photograph(const Imager& camera, const calib::BoardSheet& sheet, const Pose& camera_from_board) {
-  constexpr int k_samples = 3;
+constexpr int k_samples = 3;  // on each side of a pixel
+
+// The directions of a camera's rays through each pixel's samples, row by row.
+std::vector<Vector3d> sample_rays(const Imager& camera) {
+  std::vector<Vector3d> rays;
+  for (int y = 0; y < camera.height * k_samples; ++y)
+    for (int x = 0; x < camera.width * k_samples; ++x)
+      rays.push_back(*camera.lens.unproject({(x + 0.5) / k_samples - 0.5, (y + 0.5) / k_samples - 0.5}));
+  return rays;
+}
+
+// The board as the camera sees it along its rays.
+cv::Mat photograph(const Imager& camera,
+                   const std::vector<Vector3d>& rays,
+                   const calib::BoardSheet& sheet,
+                   const Pose& camera_from_board) {
   const Pose board_from_camera = camera_from_board.inverse();
+  const Eigen::Matrix3d rotation = board_from_camera.rotation.toRotationMatrix();
   cv::Mat fine(camera.height * k_samples, camera.width * k_samples, CV_8U);
   for (int y = 0; y < fine.rows; ++y) {
     for (int x = 0; x < fine.cols; ++x) {
-      const Vector2d px((x + 0.5) / k_samples - 0.5, (y + 0.5) / k_samples - 0.5);
-      const Vector3d d = board_from_camera.rotation * *camera.lens.unproject(px);
+      const Vector3d d = rotation * rays[static_cast<std::size_t>(y * fine.cols + x)];
       const Vector3d p = board_from_camera.translation - board_from_camera.translation.z() / d.z() * d;
       const Vector2d at = sheet.px_board_origin + sheet.pixels_per_metre * p.head<2>();
       const int u = static_cast<int>(std::lround(at.x())), v = static_cast<int>(std::lround(at.y()));
@@ -165,12 +178,13 @@ void write_example_photographs(const std::filesystem::path& folder, int count) {
   const calib::Board board = calib::Board::parse(k_example_board).value();
   const calib::BoardSheet sheet = calib::draw_board(board, {.square_px = 48});
   const Pose middle(Eigen::Quaterniond::Identity(), Vector3d(-board.width_m() / 2, -board.height_m() / 2, 0));
+  const std::vector<Vector3d> rays = sample_rays(example_camera());
   for (int i = 0; i < count; ++i) {
     const double around = 2.2 * i;
     const Pose camera_from_board(exp_rotation({0.45 * std::cos(around), 0.45 * std::sin(around), 0.1 * i}),
                                  Vector3d(0.05 * std::sin(around), 0.03 * std::cos(around), 0.6 + 0.02 * i));
     expect(write_png(folder / fmt::format("photo{}.png", i),
-                     photograph(example_camera(), sheet, camera_from_board * middle)));
+                     photograph(example_camera(), rays, sheet, camera_from_board * middle)));
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Rigid bodies with markers on them: their poses in the images of one moment, and over time.
+// Rigid bodies with markers on them: their poses in the images of one moment, and over time.
 #include <filesystem>
 #include <memory>
 #include <span>

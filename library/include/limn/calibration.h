@@ -1,6 +1,6 @@
 #pragma once
 
-/// From captures on disk to a calibrated rig, a measured surface, and the pose of a CAD mesh in it.
+// From captures on disk to a calibrated rig, a measured surface, and the pose of a CAD mesh in it.
 #include <cstdint>
 #include <filesystem>
 #include <memory>

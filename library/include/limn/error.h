@@ -1,6 +1,6 @@
 #pragma once
 
-/// What functions throw, how long calls report where they are, and notes for people.
+// What functions throw, how long calls report where they are, and notes for people.
 #include <functional>
 #include <stdexcept>
 #include <string>

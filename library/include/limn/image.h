@@ -1,6 +1,6 @@
 #pragma once
 
-/// Images: views on memory of the caller, and images with memory of their own.
+// Images: views on memory of the caller, and images with memory of their own.
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Square markers: finding them in an image, and the pose of each from one image.
+// Square markers: finding them in an image, and the pose of each from one image.
 #include <array>
 #include <filesystem>
 #include <memory>

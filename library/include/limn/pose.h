@@ -1,6 +1,6 @@
 #pragma once
 
-/// Points, poses and their covariances.
+// Points, poses and their covariances.
 #include <array>
 
 #include "limn/export.h"

@@ -1,7 +1,7 @@
 #pragma once
 
-/// Scenes, and their images: what projectors show on the prototype, and what a screen shows over a camera's
-/// image.
+// Scenes, and their images: what projectors show on the prototype, and what a screen shows over a camera's
+// image.
 #include <cstddef>
 #include <filesystem>
 #include <memory>

@@ -1,6 +1,6 @@
 #pragma once
 
-/// Cameras, projectors and rigs: their lenses and places, and the files that hold them.
+// Cameras, projectors and rigs: their lenses and places, and the files that hold them.
 #include <filesystem>
 #include <memory>
 #include <optional>

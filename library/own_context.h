@@ -1,17 +1,13 @@
 #pragma once
 
-#include <array>
 #include <optional>
 #include <string>
 
+#include "device/egl_current.h"
 #include "device/gl_context.h"
 #include "limn/export.h"
 
 namespace limn::LIMN_VERSIONED {
-
-/// What is current on a thread: display, context, surface to draw on and surface to read from of EGL; null
-/// pointers where nothing is.
-using CurrentContext = std::array<void*, 4>;
 
 /// An OpenGL context of the library's own. It is current only while the library draws, so that a thread keeps
 /// the context that its program uses, and any thread may draw.
@@ -32,7 +28,7 @@ class OwnContext {
 
    private:
     const OwnContext* context_;
-    CurrentContext before_ = {};
+    limn::device::EglCurrent before_ = {};
   };
 
   /// As in device::GlContext.
@@ -40,7 +36,7 @@ class OwnContext {
 
  private:
   std::optional<limn::device::GlContext> context_;
-  CurrentContext handles_ = {};
+  limn::device::EglCurrent handles_ = {};
 };
 
 }  // namespace limn::LIMN_VERSIONED
