@@ -53,7 +53,7 @@ Pose Pose::inverse() const { return to_public(to_room(*this).inverse()); }
 
 std::array<double, 16> Pose::matrix() const {
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = to_room(*this).matrix();
-  std::array<double, 16> out;
+  std::array<double, 16> out = {};
   std::copy_n(rows.data(), out.size(), out.begin());
   return out;
 }

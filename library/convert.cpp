@@ -89,7 +89,7 @@ cv::Mat mat_of(const MutableImageView& image, int width, int height) {
 }
 
 cv::Mat grey_of(const ImageView& image) {
-  const cv::Mat pixels = mat_of(image);
+  cv::Mat pixels = mat_of(image);
   if (image.format == PixelFormat::grey) return pixels;
   return converted(pixels, image.format == PixelFormat::rgb ? cv::COLOR_RGB2GRAY : cv::COLOR_BGR2GRAY);
 }

@@ -165,7 +165,7 @@ struct Renderer::Impl {
     const limn::Imager& shown_by = projector(index);
     const limn::scene::PosedScene room = room_of(posed);
     const OwnContext::Scope scope = current();
-    const cv::Mat image = renderer->projector_image(index, room, LIMN_VERSIONED::to_room(viewer));
+    cv::Mat image = renderer->projector_image(index, room, LIMN_VERSIONED::to_room(viewer));
     if (marker_light == limn::tracker::MarkerLight::as_is) return image;
     const cv::Mat mask = limn::tracker::marker_mask(shown_by, limn::scene::bodies(room_scene()),
                                                     limn::scene::tracks_of(room_scene(), room));
