@@ -1,0 +1,67 @@
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+#include <functional>
+#include <optional>
+#include <type_traits>
+#include <utility>
+
+#include "limn/error.h"
+
+/// How the library is called from Python's threads.
+namespace limn::python {
+namespace py = pybind11;
+
+/// Calls `function` while other threads of Python run. Everything that may take long or may log is called in
+/// this way: who waits for the log while holding the GIL would wait for ever for a log function that wants
+/// it. It is no guard object, because Python ends threads of a program that ends where they ask for the GIL,
+/// which must not be in a destructor.
+template <class F>
+auto without_gil(F&& function) -> decltype(function()) {
+  PyThreadState* const state = PyEval_SaveThread();
+  if constexpr (std::is_void_v<decltype(function())>) {
+    try {
+      function();
+    } catch (...) {
+      PyEval_RestoreThread(state);
+      throw;
+    }
+    PyEval_RestoreThread(state);
+  } else {
+    std::optional<decltype(function())> value;
+    try {
+      value.emplace(function());
+    } catch (...) {
+      PyEval_RestoreThread(state);
+      throw;
+    }
+    PyEval_RestoreThread(state);
+    return *std::move(value);
+  }
+}
+
+/// A function that calls `function` in this way.
+template <class R, class... Arguments>
+auto released(R (*function)(Arguments...)) {
+  return [function](Arguments... arguments) { return without_gil([&] { return function(arguments...); }); };
+}
+
+/// Runs a long call in a thread of its own, while this thread calls `progress` (a callable, or None) and lets
+/// Python handle signals. An exception of `progress` or of a signal handler (KeyboardInterrupt) stops the
+/// call, and is what the caller gets once it has stopped; so does False.
+void run_stoppable(const py::object& progress, const std::function<void(const ReportProgress&)>& call);
+
+template <class F>
+auto stoppable(const py::object& progress, F&& call) {
+  std::optional<decltype(call(std::declval<const ReportProgress&>()))> value;
+  run_stoppable(progress, [&](const ReportProgress& report) { value.emplace(call(report)); });
+  return *std::move(value);
+}
+
+/// The classes limn.Error and limn.Stopped, and how exceptions become them.
+void add_errors(py::module_& module);
+/// set_log(), which ends by itself before the interpreter does.
+void add_log(py::module_& module);
+
+}  // namespace limn::python
