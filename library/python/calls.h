@@ -13,10 +13,9 @@
 namespace limn::python {
 namespace py = pybind11;
 
-/// Calls `function` while other threads of Python run. Everything that may take long or may log is called in
-/// this way: who waits for the log while holding the GIL would wait for ever for a log function that wants
-/// it. It is no guard object, because Python ends threads of a program that ends where they ask for the GIL,
-/// which must not be in a destructor.
+/// Calls `function` while other threads of Python run: everything that may take long or may log. It is no
+/// guard object, because Python ends the threads of a program that ends where they ask for the GIL, which
+/// must not be in a destructor.
 template <class F>
 auto without_gil(F&& function) -> decltype(function()) {
   PyThreadState* const state = PyEval_SaveThread();

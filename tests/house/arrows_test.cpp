@@ -52,6 +52,7 @@ const std::map<std::string, Names>& allowed() {
       {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing", "remote"})},
       {"validate", with({"wizard", "wizard/measure", "session", "session/drawing"})},
       {"library", {"core", "scene", "device", "calib", "tracker", "projector", "exchange", "wizard/measure"}},
+      {"library/python", {}},  // the public headers alone
       {"apps", with({"device/gui", "exchange", "exchange/printing", "design", "wizard", "wizard/measure",
                      "session", "session/drawing", "remote", "nodes", "validate"})},
   };
@@ -115,6 +116,7 @@ const std::map<std::string, Names>& guests() {
       {"opencv2/imgcodecs", {}},  // its libraries would double the time of the program's start
       {"opencv2/videoio", {"device"}},
       {"apriltag/", {"tracker"}},
+      {"pybind11/", {"library/python"}},
   };
   return homes;
 }

@@ -35,7 +35,7 @@ class Images(unittest.TestCase):
     def test_of_a_projector(self):
         image = self.renderer.draw_projector(0, self.posed, self.viewer)
         np.testing.assert_array_equal(image, self.reference("projector"))
-        self.assertGreater(image.max(), 100)
+        self.assertGreater(image.max(), 40)
 
     def test_of_the_program(self):
         subprocess.run(
@@ -71,15 +71,16 @@ class Images(unittest.TestCase):
         part = self.posed.parts[0]
         moved = limn.PosedPart(part.slot, part.variant, limn.Pose(translation=(0.05, 0, 0)) * part.world_from_part)
         posed = limn.PosedScene(self.posed.world_from_prototype, [moved])
-        image = self.renderer.draw_view(self.rig.find("camera0"), posed)
-        self.assertFalse((image == self.reference("view")).all())
+        image = self.renderer.draw_projector(0, posed, self.viewer)
+        self.assertFalse((image == self.reference("projector")).all())
+        self.assertGreater((image > 0).sum(), 100)
 
     def test_refuse_what_cannot_be(self):
         small, grey = np.zeros((2, 2, 3), np.uint8), np.zeros((480, 640), np.uint8)
         read_only = np.zeros((480, 640, 3), np.uint8)
         read_only.flags.writeable = False
         for out, error, text in [
-            (small, limn.Error, "640x480, found a view of 2x2"),
+            (small, limn.Error, "expected memory for 640x480 pixels, found a view of 2x2"),
             (grey, limn.Error, "grey"),
             (read_only, ValueError, "found one that is read-only"),
             ([], TypeError, "found list"),

@@ -110,7 +110,7 @@ class Messages(unittest.TestCase):
     def message_of_program(self, *words):
         done = subprocess.run([PROGRAM, *words], capture_output=True, text=True)
         self.assertEqual(done.returncode, 1, done.stderr)
-        return done.stderr.strip().removeprefix("limn: ")
+        return done.stderr.splitlines()[0].removeprefix("limn: ")
 
     def test_a_missing_image(self):
         with self.assertRaises(limn.Error) as raised:
