@@ -90,7 +90,7 @@ const std::map<std::string, Names>& guests() {
       {"embree3/", {"sim"}},
       {"embree4/", {"sim"}},
       {"GLFW/", {"device", "device/gui", "session"}},
-      {"epoxy/", {"device", "projector", "device/gui", "session"}},
+      {"epoxy/", {"device", "projector", "device/gui", "session", "library"}},
       {"EGL/", {"device"}},
       {"CLI/", {"apps"}},
       {"imgui", {"device/gui", "wizard", "session"}},

@@ -64,7 +64,7 @@ class Surface(unittest.TestCase):
     def test_classes_have_the_members_of_the_stub(self):
         for node in STUB.body:
             if isinstance(node, ast.ClassDef) and not issubclass(getattr(limn, node.name), Exception):
-                members = set(vars(getattr(limn, node.name))) - GIVEN
+                members = {name for name in vars(getattr(limn, node.name)) if "pybind11" not in name} - GIVEN
                 self.assertEqual(members, stub_members(node) - GIVEN, node.name)
 
     def test_arguments_are_those_of_the_stub(self):
