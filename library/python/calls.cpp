@@ -63,6 +63,23 @@ class Exchange {
   bool is_stopped_ = false, is_ended_ = false;
 };
 
+// A thread that has ended when this ends. Python ends this thread in the middle of the loop below, without
+// the GIL, if it is a daemon and the program ends.
+class Worker {
+ public:
+  Worker(Exchange* exchange, const std::function<void()>& work) : exchange_(exchange), thread_(work) {}
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+  ~Worker() {
+    if (!exchange_->is_ended()) exchange_->answer(false);
+    thread_.join();
+  }
+
+ private:
+  Exchange* const exchange_;
+  std::thread thread_;
+};
+
 // Whether the call goes on. Throws what Python raises.
 bool is_going_on(const py::object& function, const std::optional<Progress>& progress) {
   if (PyErr_CheckSignals() != 0) throw py::error_already_set();
@@ -78,7 +95,7 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
   Exchange exchange(!progress.is_none());
   std::exception_ptr failure;
   std::optional<py::error_already_set> raised;
-  std::thread worker([&] {
+  const Worker worker(&exchange, [&] {
     try {
       call([&](const Progress& at) { return exchange.report(at); });
     } catch (...) {
@@ -99,7 +116,6 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
     }
     if (at || !goes_on) exchange.answer(goes_on);
   }
-  without_gil([&] { worker.join(); });
   if (raised) throw *raised;
   if (failure) std::rethrow_exception(failure);
 }
