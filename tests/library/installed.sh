@@ -37,17 +37,16 @@ devices="$(readelf -d "$library" | grep -oE 'lib(glfw|aravis|OpenEXR|opencv_vide
 "$cmake" --build "$folder/build" >"$folder/log" 2>&1 || fail "$(cat "$folder/log")"
 ! grep -q warning "$folder/log" || fail "$(cat "$folder/log")"
 
-"$inputs" "$folder/in"
-video="$folder/in/video"
+video="$inputs/video"
 cd "$folder"
 prints "apriltag_36h11:1" build/detect "$video/image0.png" apriltag_36h11 "$video/camera0.cameramodel" 80
 prints "standard deviation in depth" build/detect "$video/image0.png" apriltag_36h11 "$video/camera0.cameramodel" 80
 prints "by 2 markers" build/track "$video/camera0.cameramodel" "$video/body.json" 30 "$video"/image?.png
 prints "back within" build/camera_files "$video/camera0.cameramodel" "$folder/camera"
 expects camera.cameramodel camera.yml camera_ros.yaml
-prints "held-out" build/calibrate in/photographs rig charuco:8x6:40mm
+prints "held-out" build/calibrate "$inputs/photographs" rig charuco:8x6:40mm
 expects rig/report.html rig/rig.json
-prints ", 4." build/project in/rig "$source/config/scenes/door" in/poses.json images
+prints ", 4." build/project "$inputs/rig" "$source/config/scenes/door" "$inputs/poses.json" images
 expects images/projector-projector0.png images/composite-camera0.png
 if build/detect "$folder/none.png" apriltag_36h11 2>error; then fail "detect: expected an error without an image."; fi
 grep -q none.png error || fail "detect: expected the file's name, found: $(cat error)"
