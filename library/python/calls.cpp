@@ -183,7 +183,7 @@ raise it.)",
       g_error);
   py::register_exception_translator([](std::exception_ptr exception) {
     try {
-      if (exception) std::rethrow_exception(exception);
+      if (exception) std::rethrow_exception(std::move(exception));
     } catch (const Stopped& error) {
       raise(g_stopped, error.what());
     } catch (const Error& error) {
