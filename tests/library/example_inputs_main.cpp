@@ -1,4 +1,4 @@
-// library_example_inputs FOLDER: writes what the examples work on, for installed.sh.
+// library_example_inputs FOLDER: writes what the examples and the tests in Python work on.
 #include <exception>
 #include <filesystem>
 
@@ -11,6 +11,7 @@ int main(int count, char** words) try {
   limn::test::write_example_video(folder / "video", 4);
   limn::test::write_example_photographs(folder / "photographs", 8);
   limn::test::write_example_scene(folder);
+  limn::test::write_example_scan(folder / "scan");
   return 0;
 } catch (const std::exception& error) {
   limn::print_out("{}\n", error.what());

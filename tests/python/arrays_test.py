@@ -5,6 +5,7 @@ import pathlib
 import pickle
 import sys
 import tempfile
+import tracemalloc
 import unittest
 
 import numpy as np
@@ -14,8 +15,14 @@ import limn
 VIDEO = pathlib.Path(sys.argv[1]) / "video"
 
 
-def address(array):
-    return array.__array_interface__["data"][0]
+def largest_memory(call):
+    """What numpy held at most during a call, in bytes."""
+    tracemalloc.start()
+    try:
+        call()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 class Images(unittest.TestCase):
@@ -45,6 +52,14 @@ class Images(unittest.TestCase):
         read_only = self.image.copy()
         read_only.flags.writeable = False
         self.assertEqual(self.corners(read_only), self.corners(self.image))
+
+    def test_are_not_copied(self):
+        self.detector.detect(self.image)
+        size = self.image.nbytes
+        self.assertGreater(largest_memory(self.image.copy), size)  # so numpy's memory is counted
+        self.assertLess(largest_memory(lambda: self.detector.detect(self.image)), 0.1 * size)
+        self.assertLess(largest_memory(lambda: self.detector.detect(self.image[:, 100:])), 0.1 * size)
+        self.assertLess(largest_memory(lambda: limn.read_image(VIDEO / "image0.png", "grey")), 0.1 * size)
 
     def test_the_order_of_colours_is_said(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -123,6 +138,13 @@ class Numbers(unittest.TestCase):
         for bad, error in [("abc", TypeError), (None, TypeError), (points[:, :2], ValueError), (np.zeros(4), ValueError)]:
             with self.assertRaisesRegex(error, r"expected an array of"):
                 camera.project(bad)
+
+    def test_points_are_not_copied(self):
+        camera, points = limn.Imager.pinhole("c", 640, 480, 60, limn.Pose()), np.ones((10000, 3))
+        camera.project(points)
+        pixels = 2 * 8 * len(points)
+        self.assertLess(largest_memory(lambda: camera.project(points)), 1.1 * pixels)
+        self.assertGreater(largest_memory(lambda: camera.project(points.astype(np.float32))), 1.1 * pixels)
 
     def test_shapes_are_named(self):
         with self.assertRaisesRegex(ValueError, r"expected an array of shape \(4,\), found shape \(3,\)"):
