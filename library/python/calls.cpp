@@ -1,8 +1,10 @@
 #include "library/python/calls.h"
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
@@ -11,6 +13,51 @@ namespace limn::python {
 namespace {
 
 constexpr std::chrono::milliseconds k_between_signals{50};
+constexpr std::chrono::seconds k_end_waits_for_calls{5};
+
+// All calls of the library, for the program's end.
+struct Calls {
+  std::mutex mutex;
+  std::condition_variable ended;
+  int count = 0;
+  std::optional<std::thread::id> ending_thread;  // once the program ends
+};
+
+// It is never destroyed, because threads may wait in it when the program ends.
+Calls& calls() {
+  static auto* const all = new Calls;
+  return *all;
+}
+
+bool is_program_ending() {
+  const std::lock_guard lock(calls().mutex);
+  return calls().ending_thread.has_value();
+}
+
+void end_calls() {
+  std::unique_lock lock(calls().mutex);
+  calls().ending_thread = std::this_thread::get_id();
+  calls().ended.wait_for(lock, k_end_waits_for_calls, [] { return calls().count == 0; });
+}
+
+}  // namespace
+
+CallInProgress::CallInProgress() {
+  std::unique_lock lock(calls().mutex);
+  calls().ended.wait(lock, [] {
+    const auto& ending = calls().ending_thread;
+    return !ending || *ending == std::this_thread::get_id();
+  });
+  ++calls().count;
+}
+
+CallInProgress::~CallInProgress() {
+  const std::lock_guard lock(calls().mutex);
+  --calls().count;
+  calls().ended.notify_all();
+}
+
+namespace {
 
 // Between the thread that works and the one that talks with Python.
 class Exchange {
@@ -21,11 +68,12 @@ class Exchange {
 
   bool report(const Progress& progress) {
     std::unique_lock lock(mutex_);
-    if (is_stopped_ || !is_reported_) return !is_stopped_;
+    if (is_stopped_ || is_program_ending()) return false;
+    if (!is_reported_) return true;
     progress_ = progress;
     changed_.notify_all();
-    changed_.wait(lock, [&] { return !progress_; });
-    return !is_stopped_;
+    while (progress_ && !is_program_ending()) changed_.wait_for(lock, k_between_signals);
+    return !is_stopped_ && !progress_;
   }
 
   void end() {
@@ -67,7 +115,11 @@ class Exchange {
 // the GIL, if it is a daemon and the program ends.
 class Worker {
  public:
-  Worker(Exchange* exchange, const std::function<void()>& work) : exchange_(exchange), thread_(work) {}
+  Worker(Exchange* exchange, std::shared_ptr<const CallInProgress> call, const std::function<void()>& work)
+      : exchange_(exchange), thread_([work, call = std::move(call)]() mutable {
+          work();
+          call.reset();
+        }) {}
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
   ~Worker() {
@@ -95,7 +147,8 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
   Exchange exchange(!progress.is_none());
   std::exception_ptr failure;
   std::optional<py::error_already_set> raised;
-  const Worker worker(&exchange, [&] {
+  auto in_progress = without_gil([] { return std::make_shared<const CallInProgress>(); });
+  const Worker worker(&exchange, std::move(in_progress), [&] {
     try {
       call([&](const Progress& at) { return exchange.report(at); });
     } catch (...) {
@@ -116,6 +169,7 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
     }
     if (at || !goes_on) exchange.answer(goes_on);
   }
+  without_gil([] {});  // a thread of a program that has ended meanwhile stays here
   if (raised) throw *raised;
   if (failure) std::rethrow_exception(failure);
 }
@@ -126,6 +180,7 @@ namespace {
 PyObject* g_error = nullptr;
 PyObject* g_stopped = nullptr;
 PyObject* g_log = nullptr;  // the function of set_log(); guarded by the GIL
+std::atomic<bool> g_is_logged = false;
 
 // Text of the library, which may name files whose names are no UTF-8.
 py::str text_of(const std::string& text) {
@@ -144,6 +199,7 @@ PyObject* new_exception(py::module_& module, const char* name, const char* doc, 
 
 // Any thread of the library calls it.
 void log_to_python(bool is_warning, const std::string& line) {
+  if (!g_is_logged) return;
   const py::gil_scoped_acquire gil;
   if (!g_log) return;
   try {
@@ -159,9 +215,9 @@ void set_python_log(const py::object& log) {
                          std::string(py::str(py::type::handle_of(log).attr("__name__"))) + ".");
   const auto before = py::reinterpret_steal<py::object>(g_log);
   g_log = log.is_none() ? nullptr : py::object(log).release().ptr();
-  const bool is_wanted = g_log != nullptr;
+  g_is_logged = g_log != nullptr;
   without_gil([&] {
-    if (is_wanted)
+    if (g_is_logged)
       limn::set_log(log_to_python);
     else
       limn::set_log({});
@@ -198,7 +254,12 @@ void add_log(py::module_& module) {
       R"(Sets who gets the notes and warnings that the program prints to stderr, for example that the unit of
 a mesh was guessed: log(is_warning, line), or None for nobody, which is the default. Several threads
 may call it. What it raises goes to sys.unraisablehook. It ends by itself when the interpreter does.)");
-  py::module_::import("atexit").attr("register")(py::cpp_function([] { set_python_log(py::none()); }));
+  py::module_::import("atexit").attr("register")(py::cpp_function([] {
+    set_python_log(py::none());
+    PyThreadState* const state = PyEval_SaveThread();
+    end_calls();
+    PyEval_RestoreThread(state);
+  }));
 }
 
 }  // namespace limn::python

@@ -13,15 +13,29 @@
 namespace limn::python {
 namespace py = pybind11;
 
-/// Calls `function` while other threads of Python run: everything that may take long or may log. It is no
-/// guard object, because Python ends the threads of a program that ends where they ask for the GIL, which
-/// must not be in a destructor.
+/// A call of the library in progress. The program's end waits for them, because the library's variables end
+/// with it; a call that begins later, in a daemon thread, never begins.
+class CallInProgress {
+ public:
+  CallInProgress();
+  CallInProgress(const CallInProgress&) = delete;
+  CallInProgress& operator=(const CallInProgress&) = delete;
+  ~CallInProgress();
+};
+
+/// Calls `function` while other threads of Python run: everything that may take long or may log. The GIL is
+/// not taken back in a destructor, because Python ends the daemon threads of a program that ends where they
+/// ask for it.
 template <class F>
 auto without_gil(F&& function) -> decltype(function()) {
   PyThreadState* const state = PyEval_SaveThread();
+  const auto call = [&]() -> decltype(function()) {
+    const CallInProgress in_progress;
+    return function();
+  };
   if constexpr (std::is_void_v<decltype(function())>) {
     try {
-      function();
+      call();
     } catch (...) {
       PyEval_RestoreThread(state);
       throw;
@@ -30,7 +44,7 @@ auto without_gil(F&& function) -> decltype(function()) {
   } else {
     std::optional<decltype(function())> value;
     try {
-      value.emplace(function());
+      value.emplace(call());
     } catch (...) {
       PyEval_RestoreThread(state);
       throw;
@@ -60,7 +74,8 @@ auto stoppable(const py::object& progress, F&& call) {
 
 /// The classes limn.Error and limn.Stopped, and how exceptions become them.
 void add_errors(py::module_& module);
-/// set_log(), which ends by itself before the interpreter does.
+/// set_log(), and what happens when the program ends: nothing more is logged, and calls in other threads are
+/// waited for.
 void add_log(py::module_& module);
 
 }  // namespace limn::python

@@ -195,5 +195,27 @@ print(len(lines) >= 20)
                 self.assertEqual(self.run_code(code).stderr, "")
 
 
+class ProgramsEnd(unittest.TestCase):
+    def test_while_daemon_threads_work(self):
+        code = f"""
+import limn, tempfile, threading, time
+image = limn.read_image({str(INPUTS / "video/image0.png")!r}, "grey")
+def detect():
+    detector = limn.Detector(["apriltag_36h11"])
+    while True:
+        detector.detect(image)
+def solve():
+    with tempfile.TemporaryDirectory() as folder:
+        while True:
+            limn.solve({str(INPUTS / "photographs")!r}, folder + "/rig", cameras_only=True, board={BOARD!r})
+for work in (detect, detect, solve):
+    threading.Thread(target=work, daemon=True).start()
+time.sleep(0.2)
+"""
+        for _ in range(2):
+            done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+
+
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0], *sys.argv[2:]])
