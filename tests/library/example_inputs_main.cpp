@@ -11,6 +11,7 @@ int main(int count, char** words) try {
   limn::test::write_example_video(folder / "video", 4);
   limn::test::write_example_photographs(folder / "photographs", 8);
   limn::test::write_example_scene(folder);
+  std::filesystem::remove_all(folder / "scan");  // captures are not written over others
   limn::test::write_example_scan(folder / "scan");
   return 0;
 } catch (const std::exception& error) {
