@@ -43,7 +43,7 @@ const std::map<std::string, Names>& allowed() {
       {"exchange", {"core", "scene", "projector"}},
       {"exchange/poses", {"core"}},
       {"exchange/printing", {"core", "calib", "tracker"}},
-      {"design", {"core", "calib", "tracker"}},
+      {"wizard/design", {"core", "calib", "tracker"}},
       {"wizard/measure", {"core", "scene", "calib", "tracker"}},
       {"wizard", with({"device/gui", "wizard/measure"})},
       {"session/drawing", {"core", "scene", "tracker", "projector"}},
@@ -55,8 +55,8 @@ const std::map<std::string, Names>& allowed() {
       {"library", {"core", "scene", "device", "calib", "tracker", "projector", "exchange", "wizard/measure"}},
       {"library/python", {}},  // the public headers alone
       {"apps",
-       with({"device/gui", "exchange", "exchange/printing", "design", "wizard", "wizard/measure", "session",
-             "session/drawing", "remote", "nodes", "validate", "validate/hardware_report"})},
+       with({"device/gui", "exchange", "exchange/printing", "wizard", "wizard/design", "wizard/measure",
+             "session", "session/drawing", "remote", "nodes", "validate", "validate/hardware_report"})},
   };
   return arrows;
 }
