@@ -118,7 +118,7 @@ class Report {
     report_["devices"] = chosen_.is_virtual() ? "virtual rig" : "devices of this machine";
     report_["devices_mark"] = devices_mark(chosen_, options_.rig);
     report_["with_names"] = options_.with_names;
-    if (begun_mark_.empty() || begun_mark_ == report_["devices_mark"]) return {};
+    if (begun_mark_.empty() || report_["devices_mark"] == begun_mark_) return {};
     return error(
         "{}: expected the devices, board and rig that this report was begun with ({}), found others ({}). A "
         "report is about one set of devices: name the same ones again, or use another folder.",
