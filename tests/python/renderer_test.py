@@ -3,6 +3,7 @@
 Usage: renderer_test.py INPUTS SCENE REFERENCE PROGRAM
 """
 
+import ctypes
 import pathlib
 import subprocess
 import sys
@@ -106,6 +107,59 @@ class Images(unittest.TestCase):
         self.assertEqual(len(images), 3)
         for image in images:
             np.testing.assert_array_equal(image, self.reference("projector"))
+
+
+class CallersContext:
+    """An OpenGL 4.5 context of the caller without a window, made with EGL alone."""
+
+    SURFACELESS, OPENGL_API, NO_CONFIG = 0x31DD, 0x30A2, None
+    ATTRIBUTES = (ctypes.c_int * 7)(0x3098, 4, 0x30FB, 5, 0x30FD, 1, 0x3038)  # version 4.5, core profile
+
+    def __init__(self):
+        self.egl = ctypes.CDLL("libEGL.so.1")
+        for name in ("eglGetPlatformDisplay", "eglCreateContext", "eglGetProcAddress"):
+            getattr(self.egl, name).restype = ctypes.c_void_p
+        self.display = ctypes.c_void_p(self.egl.eglGetPlatformDisplay(self.SURFACELESS, None, None))
+        assert self.egl.eglInitialize(self.display, None, None) and self.egl.eglBindAPI(self.OPENGL_API)
+        self.context = ctypes.c_void_p(
+            self.egl.eglCreateContext(self.display, self.NO_CONFIG, None, ctypes.byref(self.ATTRIBUTES))
+        )
+        assert self.egl.eglMakeCurrent(self.display, None, None, self.context)
+
+    def read_rgb(self, texture, width, height):
+        read = ctypes.CFUNCTYPE(
+            None, *[ctypes.c_uint, ctypes.c_int, ctypes.c_uint, ctypes.c_uint, ctypes.c_int, ctypes.c_void_p]
+        )(self.egl.eglGetProcAddress(b"glGetTextureImage"))
+        rgb, unsigned_byte = 0x1907, 0x1401
+        image = np.zeros((height, width, 3), np.uint8)
+        read(texture, 0, rgb, unsigned_byte, image.nbytes, image.ctypes.data_as(ctypes.c_void_p))
+        return image
+
+    def close(self):
+        self.egl.eglMakeCurrent(self.display, None, None, None)
+        self.egl.eglDestroyContext(self.display, self.context)
+
+
+class Textures(unittest.TestCase):
+    def test_in_the_callers_context_hold_the_projectors_image(self):
+        callers = CallersContext()
+        self.addCleanup(callers.close)
+        rig, scene = limn.Rig.load(INPUTS / "rig"), limn.Scene.load(SCENE)
+        posed = scene.load_poses(INPUTS / "poses.json")
+        viewer = scene.viewer(posed, rig)
+        renderer = limn.Renderer(scene, rig, context="current")
+        self.assertEqual(renderer.gl_description, "")
+        texture = renderer.draw_projector_texture(0, posed, viewer)
+        image = callers.read_rgb(texture, 640, 480)
+        del renderer
+        self.assertGreater(image.max(), 40)
+        np.testing.assert_array_equal(image, limn.Renderer(scene, rig).draw_projector(0, posed, viewer))
+
+    def test_of_a_headless_renderer_cannot_be_used(self):
+        rig, scene = limn.Rig.load(INPUTS / "rig"), limn.Scene.load(SCENE)
+        posed = scene.load_poses(INPUTS / "poses.json")
+        with self.assertRaisesRegex(limn.Error, "a texture of the headless context cannot be used elsewhere"):
+            limn.Renderer(scene, rig).draw_projector_texture(0, posed, scene.viewer(posed, rig))
 
 
 class Scenes(unittest.TestCase):

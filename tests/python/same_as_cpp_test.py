@@ -104,6 +104,17 @@ class SameAsCpp(unittest.TestCase):
             self.same_tracks(f"predicted{i}", tracker.predict(0.03 * i + 0.02))
 
 
+class Files(unittest.TestCase):
+    def test_of_kalibr_are_those_of_the_program(self):
+        rig = limn.Rig.load(INPUTS / "rig")
+        with tempfile.TemporaryDirectory() as folder:
+            own, programs = pathlib.Path(folder, "own.yaml"), pathlib.Path(folder, "programs.yaml")
+            limn.save_kalibr(rig.cameras + rig.projectors, own)
+            subprocess.run([PROGRAM, "export", "--kalibr", programs, "--rig", INPUTS / "rig"], check=True)
+            self.assertIn("cam1:", own.read_text())
+            self.assertEqual(own.read_text(), programs.read_text())
+
+
 class Messages(unittest.TestCase):
     """Those of the program, without what it puts before and after them."""
 
