@@ -32,7 +32,9 @@ TEST(LibrarySolve, GivesWhatTheProgramGives) {
   options.progress = [&](const api::Progress& progress) { return stages.push_back(progress.stage), true; };
   const api::Calibration found = api::solve(folder / "photographs", folder / "rig", options);
 
-  wizard::SolveCommandOptions command{.captures = folder / "photographs", .out = folder / "program"};
+  wizard::SolveCommandOptions command;
+  command.captures = folder / "photographs";
+  command.out = folder / "program";
   command.cameras_only = true;
   command.foreign.board = test::k_example_board;
   command.camera_model = "LENSMODEL_OPENCV4";
