@@ -68,8 +68,8 @@ TEST_F(KeptFiles, StayInTheSceneWithoutAHome) {
 
 TEST_F(KeptFiles, ThatCanBeKeptNowhereAreNamed) {
   EXPECT_TRUE(check_kept_folder(scene_));
-  fs::permissions(folder_ / "data", fs::perms(0555));
   fs::remove_all(folder_ / "data/limn");
+  fs::permissions(folder_ / "data", fs::perms(0555));
   const auto is_right = [&] {
     become_a_reader();
     const Status is_kept = check_kept_folder(scene_);
