@@ -307,8 +307,7 @@ void hint_at_pattern_ratio(const std::vector<std::string>& families,
   if (without_ratio && !is_found)
     log_info(
         "no template was found. Patterns are assumed to be half as wide as the black square; state another "
-        "share "
-        "(AR.js: patternRatio) after the file's name: artoolkit:logo.patt@0.8");
+        "share (AR.js: patternRatio) after the file's name: artoolkit:logo.patt@0.8");
 }
 
 // One for each image, without results yet.

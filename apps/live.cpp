@@ -69,8 +69,7 @@ Status check_options(const LiveOptions& options) {
   if (!options.stereo.empty() && has_devices(options))
     return usage_error(
         "--stereo: expected it without --devices and --room. For devices, set stereo at the display in the "
-        "devices "
-        "file.");
+        "devices file.");
   if (!(options.seconds >= 0) || options.seconds > 1e6)
     return usage_error("--seconds: expected a number of seconds, or 0 for no end, found {}.",
                        options.seconds);
@@ -81,8 +80,7 @@ Status check_options(const LiveOptions& options) {
       options.prediction == tracker::Prediction::filtered)
     return usage_error(
         "--triple-pose triangle: expected --prediction hold or linear with it, found filtered, which uses "
-        "the "
-        "balls' centres themselves and no pose of one image.");
+        "the balls' centres themselves and no pose of one image.");
   const char* with_devices = !options.devices.empty() ? "--devices" : "--room";
   if (has_devices(options) && options.rig.empty())
     return usage_error("{}: expected --rig and --scene with it, found neither.", with_devices);
@@ -94,8 +92,7 @@ Status check_options(const LiveOptions& options) {
     return usage_error("--serve-show: expected --serve with it, found none.");
   if (options.rig.empty() != options.scene.empty())
     return usage_error(
-        "expected --rig and --scene together, found one of them. Without both the session runs in a virtual "
-        "world.");
+        "expected --rig and --scene together, found one of them. Without both the world is virtual.");
   return {};
 }
 

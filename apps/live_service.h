@@ -6,8 +6,9 @@
 
 namespace limn::apps {
 
-/// Reports a session to the service manager: READY=1 after its first frame, WATCHDOG=1 from the frame loop (a
-/// loop that hangs sends none, and the manager starts the program again), STATUS=, and STOPPING=1 at the end.
+/// Reports a session to the service manager: READY=1 when a projector has shown its first image, WATCHDOG=1
+/// from the frame loop (a loop that hangs sends none, and the manager starts the program again), STATUS=, and
+/// STOPPING=1 at the end. A message that cannot be sent at once is tried again in the next turn.
 class LiveService : public session::SessionClient {
  public:
   LiveService() : notifier_(device::ServiceNotifier::from_environment()) {}
@@ -15,7 +16,7 @@ class LiveService : public session::SessionClient {
   void apply_edits(const session::SessionMoment& moment) override;
   void publish_state(const session::SessionMoment& moment) override;
   /// The loop has ended; files are still being written.
-  void stop() const { notifier_.send("STOPPING=1"); }
+  void stop() const { notifier_.send_within(0.5, "STOPPING=1"); }
 
  private:
   void report_status();

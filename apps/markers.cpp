@@ -23,8 +23,7 @@ Status run_markers(const MarkersOptions& options) {
     if (around_mm > 0)
       return usage_error(
           "--mount: expected a family whose markers end at their square, found {}: the holder's guides would "
-          "cover "
-          "the cells around it.",
+          "cover the cells around it.",
           options.family);
     LIMN_TRY_STATUS(exchange::run_mount(
         {options.size_mm, exchange::margin_mm(options.size_mm), options.paper_mm, options.mount}));

@@ -218,9 +218,7 @@ Result<Imager> viewer_of_files(std::span<const std::filesystem::path> files,
               share.viewer == shared.leader ? ", leads" : "");
   const auto viewer = scene::viewer_at(*shared.p_world(), scene, posed, d_up_world);
   if (!viewer)
-    return error(
-        "--viewer: expected viewers at a distance from what they look at, found the shared viewpoint in its "
-        "middle.");
+    return error("--viewer: expected viewers at a distance from what they look at, found it in its middle.");
   return *viewer;
 }
 

@@ -58,9 +58,7 @@ Result<std::vector<std::string>> chosen_variants(const std::string& text, const 
         slot != nullptr && equals != std::string::npos && find_named(slot->variants, item.substr(equals + 1));
     if (!known)
       return usage_error(
-          "--variants: expected SLOT=VARIANT of the world's scene, found '{}'. The scene's scene.json lists "
-          "them.",
-          item);
+          "--variants: expected SLOT=VARIANT of the world's scene, found '{}'. scene.json lists them.", item);
     variants[static_cast<std::size_t>(slot - world.scene->slots.data())] = item.substr(equals + 1);
     begin = end + 1;
   }

@@ -28,6 +28,9 @@ struct GlContext::Impl {
 
 namespace {
 
+constexpr const char* k_advice =
+    "Install a driver (Debian: libegl1 and libgl1-mesa-dri for software rendering).";
+
 bool has_word(const char* list, const char* word) {
   if (!list) return false;
   const std::size_t length = std::strlen(word);
@@ -89,18 +92,19 @@ EGLContext create_context(EGLDisplay display, bool* is_robust) {
 
 }  // namespace
 
+// epoxy ends the process when the library is missing.
+Status check_egl() {
+  if (dlopen("libEGL.so.1", RTLD_LAZY | RTLD_GLOBAL)) return {};
+  return error("OpenGL: expected the library libEGL.so.1, found none. {}", k_advice);
+}
+
 GlContext::GlContext(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 GlContext::GlContext(GlContext&&) noexcept = default;
 GlContext& GlContext::operator=(GlContext&&) noexcept = default;
 GlContext::~GlContext() = default;
 
 Result<GlContext> GlContext::create(bool own_threads) {
-  constexpr const char* k_advice =
-      "Install a driver (Debian: libegl1 and libgl1-mesa-dri for software rendering).";
-  // epoxy ends the process when the library is missing, so its presence is checked first.
-  if (!dlopen("libEGL.so.1", RTLD_LAZY | RTLD_GLOBAL)) {
-    return error("OpenGL: expected the library libEGL.so.1, found none. {}", k_advice);
-  }
+  LIMN_TRY_STATUS(check_egl());
   const std::vector<EGLDisplay> displays = candidate_displays(own_threads);
   for (const EGLDisplay display : displays) {
     auto impl = std::make_unique<Impl>();

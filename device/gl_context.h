@@ -7,6 +7,9 @@
 
 namespace limn::device {
 
+/// Error with what to install: the library EGL is missing. Without it any call of EGL ends the process.
+Status check_egl();
+
 /// A desktop OpenGL 4.5 core context without a window, through EGL: hardware devices first, then software
 /// ones, then Mesa without a surface. It is current on the calling thread after creation. GL objects in it
 /// must be destroyed before it.

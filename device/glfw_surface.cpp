@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "device/gl_context.h"
+
 namespace limn::device {
 namespace {
 
@@ -66,6 +68,7 @@ std::string glfw_problem() {
 }
 
 Result<GlfwSurface> GlfwSurface::open(const Options& options) {
+  LIMN_TRY_STATUS(check_egl());
   const ContextKept kept;  // GLFW makes the new window's context current for a moment, then none
   // Windows use EGL, as contexts without a window do; but only GLX has framebuffers for two eyes.
   if (options.quad_buffer) release_context();
@@ -89,7 +92,10 @@ Result<GlfwSurface> GlfwSurface::open(const Options& options) {
         "stereo on in the graphics driver's settings, or use side_by_side, top_bottom or frame_sequential.",
         options.title, glfw_problem());
   if (!surface.window_)
-    return error("window: expected a window with OpenGL 4.5, the display gives none ({}).", glfw_problem());
+    return error(
+        "window: expected a window with OpenGL 4.5, the display gives none ({}). Run limn doctor, which says "
+        "what is missing.",
+        glfw_problem());
   const Current current(surface.window_, options.quad_buffer);
   glfwSwapInterval(options.vsync ? 1 : 0);
   return surface;

@@ -4,13 +4,19 @@
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
+#include <thread>
 #include <utility>
+
+#include "core/frame.h"
 
 namespace limn::device {
 namespace {
+
+constexpr auto k_retry = std::chrono::milliseconds(5);
 
 // WATCHDOG_PID, where it is set, says which process the manager means.
 double watchdog_of_environment_s() {
@@ -43,14 +49,23 @@ ServiceNotifier::~ServiceNotifier() {
   if (socket_ >= 0) close(socket_);
 }
 
-void ServiceNotifier::send(const std::string& lines) const {
-  if (socket_ < 0) return;
+bool ServiceNotifier::send(const std::string& lines) const {
+  if (socket_ < 0) return true;
   sockaddr_un to{};
   to.sun_family = AF_UNIX;
   std::memcpy(to.sun_path, address_.data(), address_.size());
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_.size());
-  static_cast<void>(sendto(socket_, lines.data(), lines.size(), MSG_NOSIGNAL,
-                           reinterpret_cast<const sockaddr*>(&to), size));
+  return sendto(socket_, lines.data(), lines.size(), MSG_NOSIGNAL, reinterpret_cast<const sockaddr*>(&to),
+                size) >= 0;
+}
+
+bool ServiceNotifier::send_within(double limit_s, const std::string& lines) const {
+  const Stamp until = shifted(now(), limit_s);
+  while (!send(lines)) {
+    if (now() >= until) return false;
+    std::this_thread::sleep_for(k_retry);
+  }
+  return true;
 }
 
 }  // namespace limn::device

@@ -21,8 +21,11 @@ class ServiceNotifier {
   /// The time after which the manager ends a program that sends no WATCHDOG=1, in seconds; 0: never.
   double watchdog_s() const { return watchdog_s_; }
 
-  /// Sends lines of KEY=VALUE. Never waits: a message that cannot be sent at once is lost.
-  void send(const std::string& lines) const;
+  /// Sends lines of KEY=VALUE without waiting. False: the message was not sent, for example because the
+  /// manager reads more slowly than programs write; it can be tried again. Without a service manager true.
+  bool send(const std::string& lines) const;
+  /// As send(), and tries again for up to `limit_s` seconds.
+  bool send_within(double limit_s, const std::string& lines) const;
 
  private:
   ServiceNotifier(int socket, std::string address, double watchdog_s)

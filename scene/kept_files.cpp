@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <cerrno>
 #include <map>
+#include <system_error>
 
 #include "core/user_folder.h"
 
@@ -17,6 +19,22 @@ fs::path kept_folder(const fs::path& scene_folder) {
   const auto own = user_data_folder();
   if (failed || !own) return scene_folder;
   return *own / "scenes" / whole.relative_path();
+}
+
+Status check_kept_folder(const fs::path& scene_folder) {
+  if (::access(scene_folder.c_str(), W_OK) == 0) return {};
+  if (const auto own = user_data_folder(); !own)
+    return error("{}: cannot be written here, and no folder of the user can take its place. {}",
+                 scene_folder.string(), own.message());
+  fs::path there = kept_folder(scene_folder);
+  std::error_code ignored;
+  while (!fs::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
+  if (::access(there.c_str(), W_OK | X_OK) == 0) return {};
+  return error(
+      "{}: expected to write here what is made of {}, found: {}. Make the folder writable, or set "
+      "XDG_DATA_HOME "
+      "to another.",
+      there.string(), scene_folder.string(), std::generic_category().message(errno));
 }
 
 fs::path kept_file(const fs::path& scene_folder, const fs::path& name) {

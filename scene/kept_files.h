@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <vector>
 
+#include "core/result.h"
+
 namespace limn::scene {
 
 /// Where sessions keep what people make of a scene (looks/, pairings.json, comments.json): the scene's
@@ -10,6 +12,9 @@ namespace limn::scene {
 /// user for this scene: ~/.local/share/limn/scenes/ and the scene's whole path (user_data_folder() in
 /// core/user_folder.h). Without a home it is the scene's folder, where writing fails with a message.
 std::filesystem::path kept_folder(const std::filesystem::path& scene_folder);
+
+/// Error, with what to do: neither the scene's folder nor the user's one can be written.
+Status check_kept_folder(const std::filesystem::path& scene_folder);
 
 /// The file that a session reads: `name` in kept_folder() if it is there, else in the scene's folder.
 std::filesystem::path kept_file(const std::filesystem::path& scene_folder, const std::filesystem::path& name);

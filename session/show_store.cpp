@@ -50,7 +50,9 @@ std::string json_of(const std::vector<scene::Look>& looks, const std::string& na
 ShowStore::ShowStore(bool keeps) : writer_(keeps ? std::make_unique<FileWriter>() : nullptr) {}
 
 scene::ShowState ShowStore::loaded(const scene::Scene& scene, scene::ShowState show_state) {
-  if (const fs::path folder = scene::kept_folder(scene.folder); folder != scene.folder)
+  if (const Status is_kept = scene::check_kept_folder(scene.folder); !is_kept)
+    log_warning("live: {} Until then looks are not saved.", is_kept.message());
+  else if (const fs::path folder = scene::kept_folder(scene.folder); folder != scene.folder)
     log_info("live: {} cannot be written here, so looks are kept in {}.", scene.folder.string(),
              folder.string());
   for (const fs::path& file : scene::look_files(scene.folder)) {

@@ -45,6 +45,13 @@ Error bug(const std::exception& problem) {
   return error("this is a bug in Limn, please report it: {}", problem.what());
 }
 
+// `command` may be empty.
+Error wrong_options(const CLI::ParseError& problem, const std::string& command) {
+  std::string what = problem.what();
+  if (!what.ends_with('.')) what += '.';
+  return usage_error("{} Run limn{} --help for the options.", what, command.empty() ? "" : " " + command);
+}
+
 // `limn complete LIST WORDS…`, which the completions of the shells call: prints one candidate on each line.
 void print_candidates(const std::string& list,
                       const std::vector<std::string>& words,
@@ -96,7 +103,8 @@ int run_arguments(int argc, char** argv) {
     return 0;
   }
   const auto is_named = [&](const CLI::App* command) { return argc > 1 && command->get_name() == argv[1]; };
-  if (argc > 1 && argv[1][0] != '-' && std::none_of(commands.begin(), commands.end(), is_named)) {
+  const bool is_known = std::any_of(commands.begin(), commands.end(), is_named);
+  if (argc > 1 && argv[1][0] != '-' && !is_known) {
     std::string known;
     for (const CLI::App* command : commands) known += " " + command->get_name();
     return report_result(usage_error("unknown command '{}'; expected one of:{}.", argv[1], known));
@@ -104,7 +112,8 @@ int run_arguments(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& problem) {
-    return app.exit(problem) == 0 ? 0 : 2;
+    if (problem.get_exit_code() == 0) return app.exit(problem);  // --help, --version
+    return report_result(wrong_options(problem, is_known ? argv[1] : ""));
   }
   try {
     for (const CLI::App* command = &app; !command->get_subcommands().empty();) {

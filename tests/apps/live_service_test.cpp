@@ -3,17 +3,13 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
-#include <poll.h>
 #include <spawn.h>
-#include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <array>
+#include <atomic>
 #include <csignal>
-#include <cstring>
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
@@ -21,10 +17,16 @@
 
 #include "core/file.h"
 #include "core/frame.h"
+#include "core/image_io.h"
 #include "device/device_locks.h"
+#include "device/gl_context.h"
+#include "device/image_sequence_camera.h"
 #include "device/offscreen_display.h"
+#include "session/perception.h"
 #include "tests/support/matchers.h"
+#include "tests/support/service_manager.h"
 #include "tests/support/text.h"
+#include "tests/support/worlds.h"
 
 extern char** environ;
 
@@ -34,21 +36,13 @@ namespace {
 namespace fs = std::filesystem;
 
 // A service manager in small: a socket for messages, and a program that it starts.
-class Manager {
+class Manager : public test::NotifySocket {
  public:
   explicit Manager(const fs::path& folder) : folder_(folder) {
-    socket_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    address_ = "@limn-test-" + std::to_string(getpid());  // abstract: a folder's path may be too long
-    sockaddr_un to{};
-    to.sun_family = AF_UNIX;
-    std::memcpy(to.sun_path + 1, address_.data() + 1, address_.size() - 1);
-    const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + address_.size());
-    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&to), size), 0);
     log_ = open((folder / "journal").c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
   }
   ~Manager() {
     if (process_ > 0) stop(SIGKILL);
-    close(socket_);
     close(log_);
   }
 
@@ -56,7 +50,7 @@ class Manager {
     struct stat journal {};
     fstat(log_, &journal);
     std::vector<std::string> variables = {
-        "NOTIFY_SOCKET=" + address_, "WATCHDOG_USEC=1000000",
+        "NOTIFY_SOCKET=" + address(), "WATCHDOG_USEC=1000000",
         "JOURNAL_STREAM=" + std::to_string(journal.st_dev) + ":" + std::to_string(journal.st_ino)};
     for (char** variable = environ; *variable; ++variable) variables.emplace_back(*variable);
     std::vector<std::string> arguments = {"limn", "live", "--resolution", "0.25", "--seconds", "600"};
@@ -67,27 +61,6 @@ class Manager {
                           pointers(&variables).data()),
               0);
     posix_spawn_file_actions_destroy(&files);
-  }
-
-  // Whether the message comes within that time.
-  bool receives(const std::string& message, double limit_s) const {
-    const Stamp until = shifted(now(), limit_s);
-    while (now() < until) {
-      pollfd ready{socket_, POLLIN, 0};
-      if (poll(&ready, 1, 100) <= 0) continue;
-      std::array<char, 512> text{};
-      const ssize_t size = recv(socket_, text.data(), text.size(), 0);
-      if (size > 0 && std::string(text.data(), static_cast<std::size_t>(size)).starts_with(message))
-        return true;
-    }
-    return false;
-  }
-
-  // Drops the messages that have come so far.
-  void forget() const {
-    std::array<char, 512> text{};
-    while (recv(socket_, text.data(), text.size(), MSG_DONTWAIT) > 0) {
-    }
   }
 
   void send(int signal) const { kill(process_, signal); }
@@ -112,8 +85,7 @@ class Manager {
   }
 
   fs::path folder_;
-  std::string address_;
-  int socket_ = -1, log_ = -1;
+  int log_ = -1;
   pid_t process_ = -1;
 };
 
@@ -147,6 +119,67 @@ TEST(LiveService, IsBackWithLightAfterItWasKilled) {
   test::expect_contains(manager.journal(), "<6>live: ");
 }
 
+// A projector that fails until its sixth image, and ends the session after its eighth. Before each image it
+// reads what the manager was told.
+class LateProjector final : public device::Display {
+ public:
+  LateProjector(const Imager& projector, const test::NotifySocket* manager, std::atomic<bool>* is_ended)
+      : name_(projector.name),
+        size_(projector.width, projector.height),
+        manager_(manager),
+        is_ended_(is_ended) {}
+  const std::string& name() const override { return name_; }
+  cv::Size size() const override { return size_; }
+  Result<Stamp> show(const cv::Mat&) override {
+    std::string message;
+    while (!(message = manager_->next(0)).empty()) (shown_ > k_failures ? after_ : before_) += message + "\n";
+    if (++shown_ == k_last) *is_ended_ = true;
+    if (shown_ <= k_failures) return error("{}: the cable is out.", name_);
+    return now();
+  }
+  const std::string& before() const { return before_; }
+  const std::string& after() const { return after_; }
+
+ private:
+  static constexpr int k_failures = 5, k_last = 8;
+  std::string name_, before_, after_;
+  cv::Size size_;
+  const test::NotifySocket* manager_;
+  std::atomic<bool>* is_ended_;
+  int shown_ = 0;
+};
+
+TEST(LiveService, IsReadyWhenAProjectorShowsAnImage) {
+  const test::NotifySocket manager;
+  setenv("NOTIFY_SOCKET", manager.address().c_str(), 1);
+  const fs::path folder = test::test_folder();
+  const sim::World world = test::studio_world(0.1);
+  session::SessionSetup setup{world.rig, *world.scene, {}, {}};
+  const auto context = device::GlContext::create();
+  ASSERT_TRUE(context) << context.message();
+  auto output = session::SessionOutput::open({}, {}, &setup);
+  ASSERT_TRUE(output) << output.message();
+  auto perception = session::Perception::create(setup.scene, setup.rig);
+  auto session = session::Session::create(setup, &output->telemetry(), nullptr, false);
+  ASSERT_TRUE(perception && session);
+  const Imager& camera = world.rig.cameras[0];
+  ASSERT_TRUE(write_png(folder / "seen.png", cv::Mat(camera.height, camera.width, CV_8UC1, cv::Scalar(90))));
+  session::SessionDevices devices;
+  devices.cameras.push_back(std::make_unique<device::ImageSequenceCamera>(
+      device::ImageSequenceCamera::open(folder / "seen.png", {.repeat = true}).value()));
+  devices.projectors.resize(world.rig.projectors.size());
+  std::atomic<bool> is_ended = false;
+  auto projector = std::make_unique<LateProjector>(world.rig.projectors[0], &manager, &is_ended);
+  const LateProjector& late = *projector;
+  devices.projectors[0] = std::move(projector);
+  apps::LiveService service;
+  session::SessionParts parts{*perception, *session, *output, {&service}};
+  const Status played = session::play_on_devices(&devices, 20, is_ended, parts);
+  ASSERT_TRUE(played) << played.message();
+  EXPECT_EQ(late.before(), "");
+  test::expect_contains(late.after(), "READY=1");
+}
+
 TEST(LiveService, EndsWithBlackOnEveryDisplay) {
   session::SessionDevices devices;
   auto projector = std::make_unique<device::OffscreenDisplay>("projector0", cv::Size(4, 3));
@@ -175,6 +208,11 @@ TEST(LiveService, IsNotStartedTwiceOnTheSameDevicesOrMonitor) {
                         "other.json: displays: the monitor HDMI-1: expected to use it");
   other.displays[0].monitor = "HDMI-2";
   EXPECT_TRUE(device::lock_devices(other));
+
+  ASSERT_TRUE(write_file(folder / "file", "no folder"));
+  setenv("XDG_RUNTIME_DIR", (folder / "file/runtime").c_str(), 1);
+  test::expect_contains(device::lock_devices(other).message(),
+                        "for the locks of devices, found: Not a directory");
 }
 
 }  // namespace

@@ -59,9 +59,25 @@ TEST_F(KeptFiles, StayInTheSceneWithoutAHome) {
     become_a_reader();
     ::unsetenv("XDG_DATA_HOME");
     ::unsetenv("HOME");
-    return kept_folder(scene_) == scene_;
+    const Status is_kept = check_kept_folder(scene_);
+    return kept_folder(scene_) == scene_ && !is_kept &&
+           is_kept.message().find("neither XDG_DATA_HOME nor HOME") != std::string::npos;
   };
   EXPECT_EXIT(std::exit(is_right() ? 0 : 1), testing::ExitedWithCode(0), "");
+}
+
+TEST_F(KeptFiles, ThatCanBeKeptNowhereAreNamed) {
+  EXPECT_TRUE(check_kept_folder(scene_));
+  fs::permissions(folder_ / "data", fs::perms(0555));
+  fs::remove_all(folder_ / "data/limn");
+  const auto is_right = [&] {
+    become_a_reader();
+    const Status is_kept = check_kept_folder(scene_);
+    return !is_kept &&
+           is_kept.message().starts_with((folder_ / "data").string() + ": expected to write here");
+  };
+  EXPECT_EXIT(std::exit(is_right() ? 0 : 1), testing::ExitedWithCode(0), "");
+  fs::permissions(folder_ / "data", fs::perms(0755));
 }
 
 }  // namespace
