@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "apps/doctor_room.h"
+#include "apps/live.h"
 #include "core/data_folder.h"
 #include "core/file.h"
 #include "core/json_text.h"
@@ -353,6 +354,24 @@ Status run_doctor(const DoctorOptions& options) {
                                       [](const Finding& finding) { return finding.state == State::fails; });
   if (failures == 0) return {};
   return error("{} of {} do not work; the lines above say what to do.", failures, findings.size());
+}
+
+validate::ReportCommands report_commands() {
+  const auto examine = [](const std::filesystem::path& devices) { return examined({.devices = devices}); };
+  const auto play = [](const validate::ReportSession& session, bool* was_interrupted) {
+    LiveOptions options;
+    options.rig = session.rig;
+    options.scene = session.scene;
+    options.devices = session.devices;
+    options.seconds = session.seconds;
+    options.is_real_time = true;
+    options.record = session.record;
+    options.out = session.out;
+    const Status played = run_live(options);
+    *was_interrupted = live_was_ended_by_signal();
+    return played;
+  };
+  return {.examine = examine, .play = play};
 }
 
 }  // namespace limn::apps

@@ -6,6 +6,7 @@
 
 #include "apps/room.h"
 #include "core/result.h"
+#include "validate/hardware_report/report.h"
 
 namespace limn::apps {
 
@@ -23,15 +24,7 @@ struct DoctorOptions {
   std::filesystem::path release = "/etc/os-release";
 };
 
-/// The result of one test.
-struct Finding {
-  enum class State { works, fails, note };  ///< A note is about something that was not asked for.
-  std::string area;                         ///< packages, clock, gl, displays, cameras, devices or room
-  std::string name;
-  State state = State::works;
-  std::string text;
-  std::string advice;  ///< What to do; empty where nothing is to be done.
-};
+using validate::Finding;
 
 /// Tests packages, clock, OpenGL, displays, cameras, and the devices of the file: opens them and grabs
 /// frames. A missing X display or camera is only a note, unless the file or --show asks for it.
@@ -39,5 +32,8 @@ std::vector<Finding> examined(const DoctorOptions& options);
 
 /// `limn doctor`: prints the result of examined(). Error when something that was asked for does not work.
 Status run_doctor(const DoctorOptions& options);
+
+/// What run_hardware_report() (`limn doctor --report`) needs: these tests, and live sessions.
+validate::ReportCommands report_commands();
 
 }  // namespace limn::apps

@@ -3,16 +3,33 @@
 #include <algorithm>
 
 namespace limn::device {
+namespace {
+
+// Where HOST and PORT of an address end, which begin at `begin` with the login. A slash in the password does
+// not end them: then what stands before it is no HOST:PORT, and an @ follows.
+std::size_t machine_end(const std::string& url, std::size_t begin) {
+  const std::size_t slash = std::min(url.size(), url.find('/', begin));
+  const std::string head = url.substr(begin, slash - begin);
+  const std::size_t at = url.rfind('@', url.find('?', begin));
+  const std::size_t colon = head.rfind(':');
+  const bool is_machine = head.find('@') != std::string::npos || head.ends_with(']') ||
+                          head.find_first_not_of("0123456789", colon + 1) == std::string::npos;
+  if (is_machine || colon == std::string::npos || at == std::string::npos || at < slash) return slash;
+  return std::min(url.size(), url.find('/', at));
+}
+
+}  // namespace
 
 Result<Address> parse_address(const std::string& url,
                               const std::string& scheme,
                               const std::string& default_port) {
   const std::string start = scheme + "://";
-  const Error wrong = error("expected a camera's address as {}HOST[:PORT]/PATH, found {}.", start, url);
+  const Error wrong =
+      error("expected a camera's address as {}HOST[:PORT]/PATH, found {}.", start, without_login(url));
   if (!url.starts_with(start)) return wrong;
   Address address{.host = {}, .port = default_port, .path = "/", .login = {}, .shown = {}};
   std::string rest = url.substr(start.size());
-  if (const std::size_t slash = rest.find('/'); slash != std::string::npos) {
+  if (const std::size_t slash = machine_end(rest, 0); slash < rest.size()) {
     address.path = rest.substr(slash);
     rest.resize(slash);
   }
@@ -38,7 +55,7 @@ Result<Address> parse_address(const std::string& url,
 std::string without_login(const std::string& source) {
   const std::size_t scheme = source.find("://");
   if (scheme == std::string::npos) return source;
-  const std::size_t begin = scheme + 3, at = source.rfind('@', source.find('/', begin));
+  const std::size_t begin = scheme + 3, at = source.rfind('@', machine_end(source, begin));
   return at == std::string::npos || at < begin ? source : source.substr(0, begin) + source.substr(at + 1);
 }
 

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "core/image_io.h"
+#include "device/address.h"
 #include "device/gige_camera.h"
 #include "device/image_sequence_camera.h"
 #include "device/mjpeg_camera.h"
@@ -31,7 +32,7 @@ Opened open_path(const CameraConfig& config) {
   if (!std::filesystem::exists(path, problem))
     return error(
         "{}: expected a source of one of these forms: {}; found {}, which is none of them and no file.",
-        config.name, k_forms, config.source.empty() ? "an empty text" : config.source);
+        config.name, k_forms, config.source.empty() ? "an empty text" : without_login(config.source));
   if (std::filesystem::is_directory(path, problem) || is_image_name(path))
     return on_heap(ImageSequenceCamera::open(path, {.name = config.name, .repeat = config.repeat}));
   return on_heap(VideoCamera::open_file(path, {.name = config.name, .grey = config.grey}));
@@ -45,7 +46,7 @@ Status without_settings(const CameraConfig& config) {
                                                : SensorSetting::white_balance_k;
   if (!sensor.exposure_ms && !sensor.gain && !sensor.white_balance_k) return {};
   return error("{}: {} cannot be set by Limn for {}. Set it on the camera itself and remove the key.",
-               config.name, to_text(key), config.source);
+               config.name, to_text(key), without_login(config.source));
 }
 
 Opened opened(const CameraConfig& config) {
@@ -80,7 +81,8 @@ Result<std::unique_ptr<CameraSource>> open_camera(const CameraConfig& config) {
   const cv::Size found = (*camera)->size();
   return error(
       "{} ({}): expected {}x{}, found {}x{}. Set the camera to that size, or calibrate it at this one.",
-      config.name, config.source, config.size.width, config.size.height, found.width, found.height);
+      config.name, without_login(config.source), config.size.width, config.size.height, found.width,
+      found.height);
 }
 
 }  // namespace limn::device

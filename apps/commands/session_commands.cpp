@@ -7,7 +7,6 @@
 #include "apps/commands/options.h"
 #include "apps/demo.h"
 #include "apps/doctor.h"
-#include "apps/hardware_report/report.h"
 #include "apps/live.h"
 #include "apps/replay.h"
 #include "apps/room.h"
@@ -261,7 +260,7 @@ void add_doctor(CLI::App& app, Run& run) {
       "Example: limn doctor --room studio\n"
       "Example: limn doctor --report report");
   auto options = std::make_shared<DoctorOptions>();
-  auto report = std::make_shared<ReportOptions>();
+  auto report = std::make_shared<validate::ReportOptions>();
   command->add_option("--room", options->room.room, "Name or folder of a room whose machines are listed")
       ->type_name("ROOM");
   add_room_options(command, &options->room);
@@ -287,20 +286,26 @@ void add_doctor(CLI::App& app, Run& run) {
       ->type_name("BOARD")
       ->capture_default_str()
       ->needs(folder);
+  command
+      ->add_option("--placements", report->placements,
+                   "With --report: how often the board is captured; limn solve needs it in 3 placements")
+      ->check(CLI::Range(1, 9))
+      ->capture_default_str()
+      ->needs(folder);
   command->add_option("--live-seconds", report->live_s, "With --report: length of the recorded session")
       ->check(CLI::Range(1.0, 3600.0))
       ->capture_default_str()
       ->needs(folder);
   command
       ->add_flag("--with-names", report->with_names,
-                 "With --report: keep names, addresses and serial numbers in it")
+                 "With --report: keep names, addresses and serial numbers in all its files")
       ->needs(folder);
   command->callback([options, report, &run] {
     run = [options, report] {
       if (report->folder.empty()) return report_result(run_doctor(*options));
       report->devices = options->devices;
       report->rig = options->rig;
-      return report_result(run_hardware_report(*report));
+      return report_result(validate::run_hardware_report(*report, report_commands()));
     };
   });
 }

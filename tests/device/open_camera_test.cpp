@@ -55,6 +55,22 @@ TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
   expect_contains(rtsp.message(), "rtsp://127.0.0.1:1/x): expected an image");
 }
 
+TEST(OpenCamera, ALoginIsInNoMessage) {
+  // A password may have a slash, and a path an @.
+  for (const auto& [source, shown] : {std::pair{"http://sam:pa/ss@127.0.0.1:1/x", "http://127.0.0.1:1/x)"},
+                                      {"http://sam:pass@127.0.0.1:1/x@y", "http://127.0.0.1:1/x@y)"}}) {
+    const auto closed = open_camera({.source = source, .limit_s = 0.1});
+    ASSERT_FALSE(closed);
+    expect_contains(closed.message(), shown);
+    expect_contains(closed.message(), "expected an image");
+  }
+  for (const char* source : {"https://sam:pa/ss@127.0.0.1/x", "ftp://sam:pa/ss@127.0.0.1/x"}) {
+    const auto other = open_camera({.source = source, .limit_s = 0.1});
+    ASSERT_FALSE(other);
+    EXPECT_EQ(other.message().find("ss@"), std::string::npos) << other.message();
+  }
+}
+
 TEST(OpenCamera, SettingsThatASourceHasNotAndOtherSizesAreRefused) {
   const fs::path image = test::test_folder() / "one.png";
   ASSERT_TRUE(write_png(image, cv::Mat(6, 8, CV_8U, cv::Scalar(9))));

@@ -50,8 +50,9 @@ const std::map<std::string, Names>& allowed() {
       {"remote", with({"device/gui", "session", "session/drawing"})},
       {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing", "remote"})},
       {"validate", with({"wizard", "session", "session/drawing"})},
+      {"validate/hardware_report", {"core", "device", "calib", "tracker", "sim", "wizard", "nodes"}},
       {"apps", with({"device/gui", "exchange", "exchange/printing", "design", "wizard", "session",
-                     "session/drawing", "remote", "nodes", "validate"})},
+                     "session/drawing", "remote", "nodes", "validate", "validate/hardware_report"})},
   };
   return arrows;
 }

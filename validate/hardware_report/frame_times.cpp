@@ -1,11 +1,11 @@
-#include "apps/hardware_report/frame_times.h"
+#include "validate/hardware_report/frame_times.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 // The value that this share of them does not exceed.
@@ -68,4 +68,4 @@ std::string frame_times_csv(const std::vector<FrameTime>& times) {
   return csv;
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

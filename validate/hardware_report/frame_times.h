@@ -5,7 +5,7 @@
 
 #include "core/frame.h"
 
-namespace limn::apps {
+namespace limn::validate {
 
 /// When a frame was captured, and when the program had it.
 struct FrameTime {
@@ -31,4 +31,4 @@ std::vector<std::string> odd_in(const FrameRhythm& rhythm);
 /// As a table: captured_at_s and arrived_at_s, from the first stamp on.
 std::string frame_times_csv(const std::vector<FrameTime>& times);
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -1,4 +1,4 @@
-#include "apps/hardware_report/page.h"
+#include "validate/hardware_report/page.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "core/json_text.h"
 #include "core/svg.h"
 
-namespace limn::apps {
+namespace limn::validate {
 namespace {
 
 namespace fs = std::filesystem;
@@ -49,7 +49,7 @@ void add_rows(const std::string& name, const ordered_json& value, std::vector<Ht
   int number = 0;
   for (const auto& [key, part] : value.items()) {
     const std::string own = value.is_array() ? std::to_string(++number) : key;
-    add_rows(name.empty() ? own : name + " " + own, part, rows);
+    add_rows(name.empty() ? own : fmt::format("{} {}", name, own), part, rows);
   }
 }
 
@@ -125,4 +125,4 @@ Status write_report_page(const ordered_json& report, const fs::path& folder) {
                     html_page("Limn hardware report", HtmlColours::of_system, k_style, html + steps));
 }
 
-}  // namespace limn::apps
+}  // namespace limn::validate

@@ -1,0 +1,54 @@
+#include "validate/hardware_report/image_metadata.h"
+
+#include <cstdint>
+#include <string_view>
+
+namespace limn::validate {
+namespace {
+
+std::uint8_t byte_at(std::string_view bytes, std::size_t at) { return static_cast<std::uint8_t>(bytes[at]); }
+
+// What a segment holds: JFIF (APP0) and Adobe's colours (APP14) are needed for the pixels.
+bool is_metadata(std::uint8_t marker) {
+  constexpr std::uint8_t k_comment = 0xFE, k_app0 = 0xE0, k_app14 = 0xEE, k_app15 = 0xEF;
+  return marker == k_comment || (marker > k_app0 && marker <= k_app15 && marker != k_app14);
+}
+
+// Segments are FF, marker, length (2 bytes, with themselves), content, up to the pixels (SOS). What follows
+// the end of the image goes, too.
+std::optional<std::string> jpeg_without(std::string_view jpeg) {
+  constexpr std::uint8_t k_pixels = 0xDA;
+  std::string out(jpeg.substr(0, 2));
+  bool is_changed = false;
+  for (std::size_t at = 2; at + 4 <= jpeg.size();) {
+    if (byte_at(jpeg, at) != 0xFF) return std::nullopt;
+    const std::uint8_t marker = byte_at(jpeg, at + 1);
+    if (marker == 0xFF) {  // a fill byte
+      ++at;
+      continue;
+    }
+    if (marker == k_pixels) {
+      const std::size_t end = jpeg.rfind("\xFF\xD9");
+      const std::size_t last = end == std::string_view::npos || end < at ? jpeg.size() : end + 2;
+      is_changed = is_changed || last < jpeg.size();
+      out += jpeg.substr(at, last - at);
+      return is_changed ? std::optional(out) : std::nullopt;
+    }
+    const std::size_t length = 2 + 256U * byte_at(jpeg, at + 2) + byte_at(jpeg, at + 3);
+    if (length < 4 || at + length > jpeg.size()) return std::nullopt;
+    if (is_metadata(marker))
+      is_changed = true;
+    else
+      out += jpeg.substr(at, length);
+    at += length;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::string> without_metadata(const std::string& jpeg) {
+  return jpeg.starts_with("\xFF\xD8") ? jpeg_without(jpeg) : std::nullopt;
+}
+
+}  // namespace limn::validate

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace limn::validate {
+
+/// The bytes of a JPEG file without comments and metadata (EXIF, XMP and others), where cameras put names,
+/// places and serial numbers. The pixels are as before. nullopt: there is nothing to take out, or the bytes
+/// are no JPEG.
+std::optional<std::string> without_metadata(const std::string& jpeg);
+
+}  // namespace limn::validate
