@@ -179,21 +179,6 @@ Status check_placed(const scene::Scene& scene,
   return {};
 }
 
-// The bodies' poses that belong to the posed scene, whether it comes from frames or from a file.
-std::vector<Track> tracks_of(const scene::Scene& scene, const scene::PosedScene& posed) {
-  std::vector<Track> tracks;
-  const auto add = [&](const std::string& body, const Pose& world_from_body) {
-    tracks.emplace_back();
-    tracks.back().body = body;
-    tracks.back().world_from_body = world_from_body;
-  };
-  if (posed.world_from_prototype) add("prototype", *posed.world_from_prototype);
-  for (const scene::PosedPart& part : posed.parts)
-    if (const scene::Slot* slot = scene.find_slot(part.slot))
-      add(part.slot, part.world_from_part * slot->marker_from_part.inverse());
-  return tracks;
-}
-
 // The only viewer, or one at the viewpoint that several share.
 Result<Imager> viewer_of_files(std::span<const std::filesystem::path> files,
                                const scene::Scene& scene,
@@ -375,7 +360,7 @@ Status run_render(const RenderOptions& options) {
   const bool is_balanced =
       options.light.compensation != projector::Compensation::none || options.light.even_black;
   const std::vector<Body> bodies = scene::bodies(scene);
-  const std::vector<Track> tracks = tracks_of(scene, posed);
+  const std::vector<Track> tracks = scene::tracks_of(scene, posed);
   for (std::size_t i = 0; i < rig.projectors.size(); ++i) {
     const auto file = options.out / ("projector-" + rig.projectors[i].name + ".png");
     const cv::Mat image = renderer.projector_image(i, posed, viewer);

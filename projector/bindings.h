@@ -2,6 +2,6 @@
 
 namespace limn::projector {
 
-#include "shaders/bindings.glsl"
+#include "projector/shaders/bindings.glsl"
 
 }  // namespace limn::projector

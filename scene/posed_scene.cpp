@@ -162,6 +162,20 @@ std::optional<Imager> viewer_of(const Scene& scene,
   return p_eye ? viewer_towards(*p_eye, *p_middle, d_up_world) : std::nullopt;
 }
 
+std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed) {
+  std::vector<Track> tracks;
+  const auto add = [&](const std::string& body, const Pose& world_from_body) {
+    tracks.emplace_back();
+    tracks.back().body = body;
+    tracks.back().world_from_body = world_from_body;
+  };
+  if (posed.world_from_prototype) add("prototype", *posed.world_from_prototype);
+  for (const PosedPart& part : posed.parts)
+    if (const Slot* slot = scene.find_slot(part.slot))
+      add(part.slot, part.world_from_part * slot->marker_from_part.inverse());
+  return tracks;
+}
+
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, ""));
   const ConfigNode root = config.root();

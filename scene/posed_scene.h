@@ -37,6 +37,10 @@ PosedScene posed(const Scene& scene,
                  std::span<const Track> tracks,
                  std::span<const std::string> variants = {});
 
+/// The tracks of the bodies that carry what is posed, without covariances: posed() of them gives these poses
+/// again, unless parts stick to the surface.
+std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed);
+
 /// Whether both look the same: the same poses, variants, materials and light, to the last bit.
 bool is_same(const PosedScene& a, const PosedScene& b);
 /// Whether the prototype is at the same pose in both.

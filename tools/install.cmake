@@ -1,4 +1,4 @@
-# What `cmake --install BUILD [--prefix X] [--component program|data|docs]` installs. The installed tree can be moved: the program
+# What `cmake --install BUILD [--prefix X] [--component program|data|docs|library|development|python]` installs. The installed tree can be moved: the program
 # finds its data and its own libraries from where it is (core/data_folder.h).
 set(data ${CMAKE_INSTALL_DATADIR}/limn)
 set(install_files ${PROJECT_SOURCE_DIR}/tools/install)

@@ -17,12 +17,12 @@
 #include "core/file.h"
 #include "core/log.h"
 #include "core/names.h"
-#include "core/opencv_file.h"
 #include "core/opencv_markers.h"
 #include "core/predefined_family.h"
 #include "tracker/apriltag_codes.h"
 #include "tracker/aruco_mip.h"
 #include "tracker/barcode.h"
+#include "tracker/opencv_file.h"
 #include "tracker/simd.h"
 
 namespace limn::tracker {

@@ -293,6 +293,10 @@ Result<Scan> scan_captures(const CaptureSet& captures, const Rig& rig, const Sca
   Progress progress("scan", static_cast<int>(poses.size() * cameras.size()));
   for (const CapturedPose* pose : poses) {
     for (size_t camera = 0; camera < cameras.size(); ++camera) {
+      LIMN_TRY_STATUS(
+          reported(options.report_stage, {.name = "scan",
+                                          .done = static_cast<int>(scan.views.size()),
+                                          .total = static_cast<int>(poses.size() * cameras.size())}));
       LIMN_TRY(RangeView view,
                view_of(captures, *pose, camera, *cameras[camera], projectors, options, &scan));
       scan.views.push_back({cameras[camera]->name, pose->name, std::move(view), Pose()});
@@ -300,6 +304,7 @@ Result<Scan> scan_captures(const CaptureSet& captures, const Rig& rig, const Sca
       progress.step(static_cast<int>(scan.views.size()));
     }
   }
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "merge"}));
   LIMN_TRY_STATUS(options.moved ? lay_onto_first(&scan) : standing_still(scan.views));
   const auto begun = std::chrono::steady_clock::now();
   std::vector<RangeView> views;

@@ -9,6 +9,7 @@
 #include "calib/surface/tsdf_fusion.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "core/stage.h"
 
 namespace limn::calib {
 
@@ -26,6 +27,7 @@ struct ScanOptions {
   double voxel_m = 0;
   /// Smaller pieces of the mesh are removed, m².
   double least_area_m2 = 1e-4;
+  ReportStage report_stage = {};  ///< stages: scan (a step for each view), merge
 };
 
 /// A view with its camera and pose, and where the pose was registered when the prototype moved.

@@ -314,6 +314,7 @@ Result<scene::Mesh> mesh_of(const AlignOptions& command) {
 Result<MeshAligned> align_scan(const AlignOptions& command) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY_STATUS(check_options(command));
+  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "read"}));
   LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
   const double metres = command.mesh.empty() ? 1 : mesh.metres_per_unit;
   LIMN_TRY(const auto start, start_of(command, metres));
@@ -322,8 +323,10 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
   LIMN_TRY(const scene::ScanSurface scan, scene::load_ply(file, scene::metres_per_unit(command.scan_units)));
   if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
     return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
+  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "align"}));
   const scene::MeshBvh index(mesh);
   LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
+  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "compare"}));
   if (const auto size = calib::scan_size(mesh, index, scan, aligned.registration)) aligned.size = *size;
   if (calib::contradicts(aligned.size)) aligned.warnings.push_back(text_of(aligned.size));
   aligned.overlap = calib::overlap(mesh, index, scan, aligned.registration.world_from_prototype);
@@ -336,6 +339,7 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
     aligned.warnings.push_back(
         fmt::format("{} smaller regions also differ: see align.json", differences.size() - k_most_printed));
 
+  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "write"}));
   LIMN_TRY_STATUS(make_folder(command.out));
   const scene::ScanSurface map = coloured(scan, residuals, aligned.registration.world_from_prototype);
   LIMN_TRY_STATUS(scene::save_ply(map, command.out / "residual.ply"));

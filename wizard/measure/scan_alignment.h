@@ -8,6 +8,7 @@
 #include "calib/surface/registration.h"
 #include "calib/surface/scan_size.h"
 #include "core/result.h"
+#include "core/stage.h"
 #include "scene/mesh.h"
 
 namespace limn::wizard {
@@ -26,6 +27,7 @@ struct AlignOptions {
   std::vector<std::string> frames;  ///< CAMERA=PICTURE, images of the object as it was scanned
   double least_mm = 1;              ///< smaller differences are not reported
   std::filesystem::path out;
+  ReportStage report_stage = {};  ///< stages: read, align, compare, write
 };
 
 /// The result of an alignment.

@@ -146,6 +146,7 @@ Result<calib::Scan> make_scan(const calib::CaptureSet& captures,
                               const std::filesystem::path& out) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY(calib::Scan scan, calib::scan_captures(captures, rig, options));
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "write"}));
   LIMN_TRY_STATUS(write_scan(scan, 1e-3 * milliseconds_since(begun), out));
   return scan;
 }

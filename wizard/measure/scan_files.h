@@ -11,6 +11,7 @@ namespace limn::wizard {
 
 /// Measures the surface with calib::scan_captures and writes points.ply, mesh.ply (metres, the rig's world),
 /// scan.json and images into `out`. Everything is measured before the first file is written.
+/// Its stages are those of scan_captures and `write`.
 Result<calib::Scan> make_scan(const calib::CaptureSet& captures,
                               const Rig& rig,
                               const calib::ScanOptions& options,

@@ -38,13 +38,16 @@ Result<calib::BoardViews> views_of(const SolveCommandOptions& options) {
 Result<calib::Report> solve_cameras(const SolveCommandOptions& options) {
   const auto begun = SteadyClock::now();
   LIMN_TRY(const calib::BoardViews views, views_of(options));
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "decode"}));
   LIMN_TRY(calib::Observed observed, calib::observe_board(views));
   const double board_seconds = observed.seconds_board;
   calib::SolveOptions solving;
   solving.camera_model = options.camera_model;
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "solve"}));
   const auto solving_begun = SteadyClock::now();
   LIMN_TRY(calib::ModelSelection choice, calib::solve_selecting_models(observed.observations, solving));
   const double solve_seconds = seconds_after(solving_begun);
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "assess"}));
   calib::Assessment assessment = calib::assess(observed, choice.solution, std::move(choice.held_out));
   calib::Report report{std::move(observed),
                        std::move(choice.solution),
@@ -55,6 +58,7 @@ Result<calib::Report> solve_cameras(const SolveCommandOptions& options) {
                                       views.cameras.size() == 1 || views.board.is_exact);
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "write"}));
   LIMN_TRY_STATUS(calib::write_rig_folder(report, choice.options, options.out));
   return report;
 }

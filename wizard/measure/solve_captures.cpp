@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <mutex>
 
 #include "calib/capture_set.h"
 #include "calib/judge/assess.h"
@@ -166,6 +167,24 @@ Status measure_vignetting(const calib::CaptureSet& captures,
   return {};
 }
 
+// Corners and matches of all captures. The steps of the stage are series of images; several threads read
+// them.
+Result<calib::Observed> observe_in_steps(const calib::CaptureSet& captures, const ReportStage& report) {
+  Stage stage{.name = "decode", .total = static_cast<int>(captures.poses.size() * captures.cameras.size())};
+  LIMN_TRY_STATUS(reported(report, stage));
+  if (!report) return calib::observe(captures);
+  std::mutex mutex;
+  bool is_stopped = false;
+  auto observed = calib::observe(captures, {}, [&] {
+    const std::lock_guard lock(mutex);
+    is_stopped = is_stopped || !report(stage);
+    stage.done = std::min(stage.done + 1, stage.total);
+    return !is_stopped;
+  });
+  if (is_stopped) return reported([](const Stage&) { return false; }, stage).error();
+  return observed;
+}
+
 }  // namespace
 
 Result<std::optional<calib::BoardMeasured>> measured_board(const calib::CaptureSet& captures,
@@ -190,11 +209,13 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   LIMN_TRY_STATUS(calib::check_spectra(captures));
   LIMN_TRY(const auto measured, measured_board(captures, options.board_measured));
   LIMN_TRY(const auto lengths, scale_bar_lengths(captures, options.scale_bar_lengths));
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "images"}));
   LIMN_TRY_STATUS(calib::check_images(captures));
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "response"}));
   LIMN_TRY(calib::MeasuredResponse response, calib::measure_response(captures));
   for (const std::string& warning : response.warnings) log_warning("response: {}", warning);
   const double response_seconds = seconds_since(begun);
-  LIMN_TRY(calib::Observed observed, calib::observe(captures));
+  LIMN_TRY(calib::Observed observed, observe_in_steps(captures, options.report_stage));
   LIMN_TRY_STATUS(calib::check_board(captures, observed.observations));
   LIMN_TRY(const auto tie_markers, add_markers(captures, options.families, lengths, &observed.observations));
   const double board_seconds = observed.seconds_board, decode_seconds = observed.seconds_decode;
@@ -203,6 +224,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   solving.projector_model = options.projector_model;
   solving.board_measured = measured;
   solving.square_pixels = solving.board_measured && !options.pixels_not_square;
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "solve"}));
   const auto solving_begun = Clock::now();
   auto choice = calib::solve_selecting_models(observed.observations, solving);
   if (!choice) return explained(choice.error(), calib::unsolved_faults(observed), options);
@@ -218,6 +240,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   calib::Solution* const solution = &choice->solution;
   const double solve_seconds = seconds_since(solving_begun);
   log_info("solved in {} iterations; measuring the held-out error", solution->iterations);
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "assess"}));
   const auto judging_begun = Clock::now();
   calib::Assessment assessment = calib::assess(observed, *solution, std::move(choice->held_out), solving);
   compare_with_earlier(options, *solution, &assessment);
@@ -239,6 +262,7 @@ Result<calib::Report> solve_captures(const SolveCommandOptions& options) {
   report.tie_markers = tie_markers;
   report.made_at = time_now();
   report.history = calib::read_history(options.out);
+  LIMN_TRY_STATUS(reported(options.report_stage, {.name = "write"}));
   LIMN_TRY_STATUS(write_together(options.out, [&](const std::filesystem::path& into) -> Status {
     LIMN_TRY_STATUS(calib::write_rig_folder(report, solving, into));
     return response.responses.projectors.empty() ? Status()

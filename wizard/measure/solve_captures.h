@@ -7,6 +7,7 @@
 
 #include "calib/report/report.h"
 #include "core/result.h"
+#include "core/stage.h"
 #include "wizard/measure/foreign_options.h"
 
 namespace limn::wizard {
@@ -30,6 +31,8 @@ struct SolveCommandOptions {
   std::string board_measured = {};
   /// Cameras' pixels may be not square (images that were stretched), so that no print is found to be uneven.
   bool pixels_not_square = false;
+  /// Stages: images, response, decode, solve, assess, write; of cameras alone: decode, solve, assess, write.
+  ReportStage report_stage = {};
 };
 
 /// The print's measured size: that of the text (calib/board_print.h), else that of the captures, else none.

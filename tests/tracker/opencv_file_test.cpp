@@ -1,4 +1,4 @@
-#include "core/opencv_file.h"
+#include "tracker/opencv_file.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "core/file.h"
 #include "tests/support/matchers.h"
 
-namespace limn {
+namespace limn::tracker {
 namespace {
 
 OpencvFile parsed(const std::string& text) { return OpencvFile::parse(text).value(); }
@@ -89,4 +89,4 @@ TEST(OpencvFile, KeepsNumbersThatAreNone) {
 }
 
 }  // namespace
-}  // namespace limn
+}  // namespace limn::tracker

@@ -1,10 +1,10 @@
-#include "core/opencv_file.h"
+#include "tracker/opencv_file.h"
 
 #include <charconv>
 
 #include "core/data_tree.h"
 
-namespace limn {
+namespace limn::tracker {
 namespace {
 
 std::optional<int> integer_in(const std::string& text) {
@@ -55,4 +55,4 @@ std::optional<int> OpencvFile::integer(const std::string& name) const {
   return value ? integer_in(value->text) : std::nullopt;
 }
 
-}  // namespace limn
+}  // namespace limn::tracker

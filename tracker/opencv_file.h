@@ -7,7 +7,7 @@
 
 #include "core/result.h"
 
-namespace limn {
+namespace limn::tracker {
 
 /// The scalars and matrices at the top level of a file that cv::FileStorage wrote, by name; other entries
 /// have no numbers and no text. It is read by parse_data, because OpenCV 4.6 crashes on some damaged files
@@ -32,4 +32,4 @@ class OpencvFile {
   std::map<std::string, Value> values_;
 };
 
-}  // namespace limn
+}  // namespace limn::tracker
