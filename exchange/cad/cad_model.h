@@ -57,7 +57,7 @@ struct CadModel {
   std::vector<CadNode> nodes;
   std::vector<CadSource> sources;
   std::vector<std::string> warnings;
-  std::size_t triangle_count() const;  ///< Of all nodes: a mesh counts at each place.
+  std::size_t triangle_count() const;  ///< A mesh counts at each of its places.
 };
 
 /// The smallest box around a node in the file's frame, m.

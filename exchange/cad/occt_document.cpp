@@ -1,6 +1,7 @@
 #include "exchange/cad/occt_document.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <map>
 #include <opencascade/APIHeaderSection_MakeHeader.hxx>
@@ -170,7 +171,7 @@ Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
   reader.SetGDTMode(false);
   reader.SetMatMode(false);
   reader.SetViewMode(false);
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
+  if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
     return damaged(path, "STEP", "one that cannot be parsed");
   const Handle(StepData_StepModel) model = reader.ChangeReader().StepModel();
   if (model.IsNull() || model->NbEntities() == 0) return damaged(path, "STEP", "no entities");
@@ -190,17 +191,35 @@ Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
 
 // ---- IGES
 
+// The units by the numbers that IGES has for them, from 1; number 3 means that the unit is named.
+constexpr std::array<const char*, 11> k_iges_units = {"inch",       "millimetre", "",          "foot",
+                                                      "mile",       "metre",      "kilometre", "mil",
+                                                      "micrometre", "centimetre", "microinch"};
+
+void read_iges_unit(const IGESData_GlobalSection& global, OcctDocument* out) {
+  const int number = global.UnitFlag();
+  const std::string name = lower(text_of(global.UnitName()));
+  const bool is_numbered = number >= 1 && number <= static_cast<int>(k_iges_units.size()) && number != 3;
+  out->unit = is_numbered ? k_iges_units.at(static_cast<std::size_t>(number) - 1) : name;
+  out->metres_per_unit = 1e-3 * global.UnitValue();
+  const bool is_known = is_numbered || std::any_of(std::begin(k_step_units), std::end(k_step_units),
+                                                   [&](const NamedUnit& unit) { return name == unit.name; });
+  if (!is_known)
+    out->warnings.push_back(
+        fmt::format("the file's length unit '{}' (number {}) is unknown; {:.6g} mm are assumed", name, number,
+                    1e3 * out->metres_per_unit));
+}
+
 Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
   OcctDocument out{.document = new_document(), .format = "IGES"};
   IGESCAFControl_Reader reader;
   reader.SetReadVisible(true);
-  if (reader.ReadFile(path.c_str()) != IFSelect_RetDone)
+  if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
     return damaged(path, "IGES", "one that cannot be parsed");
   const auto model = Handle(IGESData_IGESModel)::DownCast(reader.Model());
   if (model.IsNull() || model->NbEntities() == 0) return damaged(path, "IGES", "no entities");
   const IGESData_GlobalSection& global = model->GlobalSection();
-  out.unit = lower(text_of(global.UnitName()));
-  out.metres_per_unit = 1e-3 * global.UnitValue();
+  read_iges_unit(global, &out);
   progress->begin_stage("translating", k_read_percent, k_transferred_percent);
   if (!reader.Transfer(out.document, progress->Start())) return damaged(path, "IGES", "no shapes");
   return out;

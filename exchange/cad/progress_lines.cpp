@@ -11,6 +11,7 @@ void ProgressLines::begin_stage(const std::string& what, double from, double to)
   what_ = what;
   from_ = from;
   to_ = to;
+  printed_ = -1;
   advance(0);
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <opencascade/BRepBuilderAPI_Sewing.hxx>
 #include <opencascade/BRep_Builder.hxx>
 #include <opencascade/TDF_Label.hxx>
 #include <opencascade/TDF_Tool.hxx>
@@ -100,6 +101,11 @@ Leaves leaves_of(const Handle(TDocStd_Document) & document) {
     if (leaf.name.empty()) leaf.name = name_of(node.Label);
     for (int depth = 0; depth < at.CurrentDepth(); ++depth)
       leaf.path.push_back(name_of(at.Current(depth).RefLabel));
+    // Some files have a nameless product for the shape inside a named one.
+    while (leaf.name.empty() && !leaf.path.empty()) {
+      leaf.name = leaf.path.back();
+      leaf.path.pop_back();
+    }
     leaf.placed = node.Location.Transformation();
     leaf.style = node.Style;
     if (node.Label != node.RefLabel) leaf.whole = own_colour(colours, node.Label);
@@ -171,8 +177,12 @@ std::vector<Body> bodies_of(const Leaf& leaf, const SolidNames& names) {
   return bodies;
 }
 
-// A chord error of one digit with which a model of so many triangles at `chord_mm` has few enough. The number
-// of triangles falls at least with the square root of the chord error.
+bool has_solids(const Leaf& leaf) {
+  return TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
+}
+
+// A chord error of one digit with which a model of so many triangles at `chord_mm` has few enough. Their
+// number falls at least with the square root of the chord error.
 double sufficient_chord_mm(double chord_mm, double triangles) {
   const double needed = chord_mm * std::pow(triangles / static_cast<double>(k_most_triangles), 2);
   const double decade = std::pow(10, std::floor(std::log10(needed)));
@@ -203,13 +213,14 @@ class Builder {
   Status add(const Leaf& leaf, double share_after) {
     const auto [known, is_new] = meshes_of_.try_emplace(leaf.key);
     if (is_new) known->second = cut(leaf);
-    for (const auto& [name, mesh] : known->second) {
-      std::string shown = name.empty() ? as_utf8(path_.stem().string()) : name;
-      model.nodes.push_back({shown, leaf.path, mesh, matrix_of(leaf.placed)});
-      triangles_ += model.meshes[mesh].triangle_count();
-    }
+    for (const auto& [name, mesh] : known->second) add_node(name, leaf.path, mesh, leaf.placed);
+    return check_count(share_after);
+  }
+
+  // Error: there are too many triangles, when this share of the places is done.
+  Status check_count(double share) const {
     if (triangles_ <= k_most_triangles) return {};
-    const double expected = static_cast<double>(triangles_) / std::max(share_after, 1e-3);
+    const double expected = static_cast<double>(triangles_) / std::max(share, 1e-3);
     return error(
         "{}: expected at most {} million triangles, found about {:.0f} million with a chord error of {} mm. "
         "Allow a larger one: limn import cad FILE --chord-mm {}",
@@ -217,32 +228,77 @@ class Builder {
         sufficient_chord_mm(how_.chord_mm, expected));
   }
 
+  // Surfaces that belong to no solid, as IGES files have them: joined along their edges into one mesh.
+  void add_loose(const std::vector<Leaf>& leaves) {
+    if (leaves.empty()) return;
+    BRepBuilderAPI_Sewing sewing(how_.chord_mm / 2);
+    std::vector<std::pair<TopoDS_Shape, Colour>> faces;
+    for (const Leaf& leaf : leaves) {
+      const FaceColours colours(leaf);
+      TopExp_Explorer at(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_FACE);
+      for (; at.More(); at.Next()) {
+        const TopoDS_Shape placed = at.Current().Moved(TopLoc_Location(leaf.placed));
+        faces.emplace_back(placed, colours(TopoDS::Face(at.Current())));
+        sewing.Add(placed);
+      }
+    }
+    sewing.Perform();
+    NCollection_DataMap<TopoDS_Shape, Colour, TopTools_ShapeMapHasher> colours;
+    for (const auto& [face, colour] : faces) {
+      const TopoDS_Shape joined = sewing.IsModifiedSubShape(face) ? sewing.ModifiedSubShape(face) : face;
+      if (!colours.IsBound(joined)) colours.Bind(joined, colour);
+    }
+    const auto colour_of_face = [&](const TopoDS_Face& face) {
+      const Colour* own = colours.Seek(face);
+      return own ? *own : colour_of(XCAFPrs_Style());
+    };
+    const std::string name = leaves.size() == 1 ? leaves.front().name : "";
+    if (const auto mesh = cut_body({sewing.SewedShape(), name}, colour_of_face))
+      add_node(name, {}, *mesh, gp_Trsf());
+  }
+
   CadModel model;
 
  private:
   using Named = std::vector<std::pair<std::string, std::size_t>>;
 
+  void add_node(const std::string& name,
+                const std::vector<std::string>& path,
+                std::size_t mesh,
+                const gp_Trsf& placed) {
+    model.nodes.push_back({shown(name), path, mesh, matrix_of(placed)});
+    triangles_ += model.meshes[mesh].triangle_count();
+  }
+
+  std::string shown(const std::string& name) const {
+    return name.empty() ? as_utf8(path_.stem().string()) : name;
+  }
+
   Named cut(const Leaf& leaf) {
     Named named;
     const FaceColours colours(leaf);
-    for (const Body& body : bodies_of(leaf, document_.solid_names)) {
-      Triangulated cut =
-          triangulated(body.shape, how_, [&](const TopoDS_Face& face) { return colours(face); });
-      const std::string& name = body.name.empty() ? document_.format : body.name;
-      if (cut.lost_faces > 0)
-        model.warnings.push_back(
-            fmt::format("'{}': {} faces are damaged and left out", name, cut.lost_faces));
-      if (cut.open_edges > 0)
-        model.warnings.push_back(
-            fmt::format("'{}': the surface does not close ({} open edges)", name, cut.open_edges));
-      if (cut.mesh.chord_error_mm > how_.chord_mm)
-        model.warnings.push_back(
-            fmt::format("'{}': the chord error is {:.2g} mm", name, cut.mesh.chord_error_mm));
-      if (cut.mesh.pieces.empty()) continue;
-      model.meshes.push_back(std::move(cut.mesh));
-      named.emplace_back(body.name, model.meshes.size() - 1);
-    }
+    for (const Body& body : bodies_of(leaf, document_.solid_names))
+      if (const auto mesh = cut_body(body, [&](const TopoDS_Face& face) { return colours(face); }))
+        named.emplace_back(body.name, *mesh);
     return named;
+  }
+
+  // The index of a body's mesh; nullopt when it has no surfaces.
+  std::optional<std::size_t> cut_body(const Body& body,
+                                      const std::function<Colour(const TopoDS_Face&)>& colours) {
+    Triangulated cut = triangulated(body.shape, how_, colours);
+    const std::string name = shown(body.name);
+    if (cut.lost_faces > 0)
+      model.warnings.push_back(fmt::format("'{}': {} faces are damaged and left out", name, cut.lost_faces));
+    if (cut.mesh.pieces.empty()) return std::nullopt;
+    if (cut.open_edges > 0)
+      model.warnings.push_back(
+          fmt::format("'{}': the surface does not close ({} open edges)", name, cut.open_edges));
+    if (cut.mesh.chord_error_mm > how_.chord_mm)
+      model.warnings.push_back(
+          fmt::format("'{}': the chord error is {:.2g} mm", name, cut.mesh.chord_error_mm));
+    model.meshes.push_back(std::move(cut.mesh));
+    return model.meshes.size() - 1;
   }
 
   const fs::path& path_;
@@ -257,9 +313,15 @@ class Builder {
 Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, ProgressLines* progress) {
   LIMN_TRY(const OcctDocument document, read_document(path, progress));
   progress->begin_stage("cutting into triangles", k_translated_percent, k_cut_percent);
-  const Leaves leaves = leaves_of(document.document);
+  Leaves leaves = leaves_of(document.document);
   Builder builder(path, document, how);
   builder.model.warnings = document.warnings;
+  if (document.format == "IGES") {
+    const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), has_solids);
+    builder.add_loose({loose, leaves.all.end()});
+    leaves.all.erase(loose, leaves.all.end());
+    LIMN_TRY_STATUS(builder.check_count(1));
+  }
   for (std::size_t i = 0; i < leaves.all.size(); ++i) {
     const double share = static_cast<double>(i + 1) / static_cast<double>(leaves.all.size());
     LIMN_TRY_STATUS(builder.add(leaves.all[i], share));
@@ -269,8 +331,10 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
   if (leaves.hidden > 0)
     model.warnings.push_back(fmt::format("{} hidden shapes are left out", leaves.hidden));
   if (model.nodes.empty())
-    return error("{}: expected a {} file with surfaces, found {}. Export solids or surfaces.", path.string(),
-                 document.format, leaves.all.empty() ? "no shapes" : "only points and curves");
+    return error(
+        "{}: expected a {} file with surfaces, found only points, curves and hidden shapes. Export solids or "
+        "surfaces.",
+        path.string(), document.format);
   model.format = document.format;
   model.schema = document.schema;
   model.unit = document.unit;

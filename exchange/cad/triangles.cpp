@@ -54,6 +54,9 @@ void cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
   IMeshTools_Parameters parameters;
   parameters.Deflection = chord_mm;
   parameters.Angle = angle_deg * M_PI / 180;
+  parameters.AngleInterior = parameters.Angle;
+  // Shorter sides would follow kinks that are smaller than the chord error, in some files without end.
+  parameters.MinSize = chord_mm;
   parameters.InParallel = Standard_False;  // a session needs the other cores for its frames
   BRepTools::Clean(shape);
   const BRepMesh_IncrementalMesh mesher(shape, parameters);
@@ -168,6 +171,20 @@ void append(const Cut& cut, CadPiece* piece) {
   }
 }
 
+// Turns a closed surface whose inside is outside.
+void face_outwards(CadMesh* mesh) {
+  double volume = 0;  // six times
+  for (const CadPiece& piece : mesh->pieces)
+    for (const auto& [a, b, c] : piece.triangles)
+      volume += piece.positions[a].cast<double>().dot(
+          piece.positions[b].cast<double>().cross(piece.positions[c].cast<double>()));
+  if (volume >= 0) return;
+  for (CadPiece& piece : mesh->pieces) {
+    for (auto& triangle : piece.triangles) std::swap(triangle[1], triangle[2]);
+    for (Eigen::Vector3f& normal : piece.normals) normal = -normal;
+  }
+}
+
 int count_open_edges(const TopoDS_Shape& shape) {
   TopTools_IndexedDataMapOfShapeListOfShape faces;
   TopExp::MapShapesAndAncestors(shape, TopAbs_EDGE, TopAbs_FACE, faces);
@@ -205,6 +222,7 @@ Triangulated triangulated(const TopoDS_Shape& shape,
   }
   out.open_edges = count_open_edges(shape);
   out.mesh.is_closed = out.open_edges == 0;
+  if (out.mesh.is_closed) face_outwards(&out.mesh);
   BRepTools::Clean(shape);
   return out;
 }
