@@ -196,8 +196,8 @@ Result<std::string> report_of(const fs::path& file,
 Result<fs::path> limn_cad_for(const fs::path& file) {
   std::error_code none;
   if (const char* chosen = std::getenv(k_variable); chosen && *chosen) {
-    if (fs::is_regular_file(chosen, none)) return fs::path(chosen);
-    return not_installed(file, fmt::format("no file '{}'", chosen));
+    if (fs::is_regular_file(chosen, none) && access(chosen, X_OK) == 0) return fs::path(chosen);
+    return not_installed(file, fmt::format("no program '{}'", chosen));
   }
   if (const fs::path own = private_library(k_program); fs::is_regular_file(own, none)) return own;
   const char* path = std::getenv("PATH");

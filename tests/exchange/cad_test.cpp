@@ -175,12 +175,12 @@ double worst_of(const scene::Mesh& mesh, const std::function<double(const Vector
 TEST_F(Cad, TheChordErrorHoldsOnCurvedSurfaces) {
   StepText balls, rings;
   balls.part("ball", {balls.sphere(40)});
-  rings.part("ring", {rings.torus(60, 15)});
+  rings.part("ring", {rings.torus(30, 8)});
   const scene::Mesh ball = load(write("ball.step", balls.file())),
                     ring = load(write("ring.step", rings.file()));
   const auto from_ball = [](const Vector3d& p) { return p.norm() - 0.040; };
   const auto from_ring = [](const Vector3d& p) {
-    return std::hypot(std::hypot(p.x(), p.y()) - 0.060, p.z()) - 0.015;
+    return std::hypot(std::hypot(p.x(), p.y()) - 0.030, p.z()) - 0.008;
   };
   ASSERT_FALSE(ball.triangles.empty() || ring.triangles.empty());
   EXPECT_LE(worst_of(ball, from_ball), 0.1_mm);
@@ -308,7 +308,7 @@ TEST_F(Cad, WhatIsNotWholeIsShownWithAWarning) {
 
 TEST_F(Cad, TooManyTrianglesAreRefusedWithAChordErrorThatWouldDo) {
   StepText step;
-  const auto ball = step.part("ball", {step.sphere(1000)});
+  const auto ball = step.part("ball", {step.sphere(250)});
   auto whole = ball;
   for (int level = 0; level < 10; ++level) {  // 1024 balls
     const auto outer = step.assembly(fmt::format("level {}", level));
