@@ -84,13 +84,13 @@ std::optional<Error> kept_failure(const fs::path& failed, const json& attempt) {
 
 // The folder and the beginning of the names of what is kept of a CAD file.
 Result<fs::path> place_of(const fs::path& file) {
-  const std::string name = "." + file.filename().string();
+  const std::string name = fmt::format(".{}", file.filename().string());
   const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
   if (access(folder.c_str(), W_OK) == 0) return folder / name;
   LIMN_TRY(const fs::path own, user_cache_folder());
   LIMN_TRY_STATUS(make_folder(own / "cad"));
   std::error_code none;
-  return own / "cad" / (name.substr(0, 1) + fingerprint(fs::absolute(file, none).string()) + name);
+  return own / "cad" / fmt::format(".{}{}", fingerprint(fs::absolute(file, none).string()), name);
 }
 
 fs::path with_end(const fs::path& place, const char* end) { return place.string() + end; }
@@ -110,7 +110,7 @@ bool is_cad_cache_name(const fs::path& path) {
 
 Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const std::stop_token& stop) {
   // A folder that was copied, or that cannot be written, may have the GLB beside the file.
-  const fs::path beside = file.parent_path() / ("." + file.filename().string() + ".glb");
+  const fs::path beside = file.parent_path() / fmt::format(".{}.glb", file.filename().string());
   if (auto kept = kept_glb(beside, file, options)) return *kept;
   LIMN_TRY(const fs::path place, place_of(file));
   const fs::path glb = with_end(place, ".glb"), failed = with_end(place, ".failed");
