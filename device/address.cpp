@@ -37,7 +37,7 @@ Result<Address> parse_address(const std::string& url,
     address.login = rest.substr(0, at);
     rest.erase(0, at + 1);
   }
-  address.shown = start + rest + address.path;
+  address.shown = without_login(url);
   const std::size_t colon = rest.rfind(':');
   if (colon != std::string::npos && rest.find(']', colon) == std::string::npos) {
     address.port = rest.substr(colon + 1);
@@ -52,11 +52,15 @@ Result<Address> parse_address(const std::string& url,
   return address;
 }
 
+// A login may have any letters: it ends at the last @ of the whole address but its query.
 std::string without_login(const std::string& source) {
   const std::size_t scheme = source.find("://");
   if (scheme == std::string::npos) return source;
-  const std::size_t begin = scheme + 3, at = source.rfind('@', machine_end(source, begin));
-  return at == std::string::npos || at < begin ? source : source.substr(0, begin) + source.substr(at + 1);
+  const std::size_t begin = scheme + 3, query = source.find('?', begin);
+  std::string shown = source.substr(0, query);
+  if (const std::size_t at = shown.rfind('@'); at != std::string::npos && at >= begin)
+    shown.erase(begin, at + 1 - begin);
+  return query == std::string::npos ? shown : shown + "?…";
 }
 
 }  // namespace limn::device

@@ -6,22 +6,6 @@
 #include "limn/calibration.h"
 #include "limn/error.h"
 
-namespace {
-
-const char* text_of(limn::Verdict verdict) {
-  switch (verdict) {
-    case limn::Verdict::good:
-      return "good";
-    case limn::Verdict::usable:
-      return "usable";
-    case limn::Verdict::reject:
-      break;
-  }
-  return "rejected";
-}
-
-}  // namespace
-
 int main(int count, char** words) try {
   if (count != 3 && count != 4) {
     std::fprintf(stderr, "calibrate CAPTURES OUT [BOARD]\n");
@@ -38,7 +22,7 @@ int main(int count, char** words) try {
   };
   const limn::Calibration calibration = limn::solve(words[1], words[2], options);
 
-  std::printf("%s: %s\n", text_of(calibration.verdict), calibration.explanation.c_str());
+  std::printf("%s\n", calibration.explanation.c_str());
   for (const limn::DeviceQuality& device : calibration.devices)
     std::printf("%s: %.3f px, %d points\n", device.name.c_str(), device.rms_px, device.points);
   std::printf("held-out %.3f px\n", calibration.held_out_rms_px);

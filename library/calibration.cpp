@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "library/convert.h"
 #include "wizard/measure/scan_alignment.h"
 #include "wizard/measure/scan_files.h"
@@ -50,10 +52,12 @@ limn::scene::LengthUnit to_room(Unit unit) {
 }
 
 void check(const ScanOptions& options) {
-  if (options.near_m < 0 || options.far_m < 0 || (options.far_m > 0 && options.far_m <= options.near_m))
+  if (!(options.near_m >= 0) || !std::isfinite(options.near_m) || !(options.far_m >= 0) ||
+      (options.far_m > 0 && options.far_m <= options.near_m))
     throw Error(fmt::format("scan: expected 0 <= near_m < far_m, in metres from the camera, found {} and {}.",
                             options.near_m, options.far_m));
-  if (options.pieces < 0 || options.voxel_m < 0 || options.smooth_px < 0)
+  if (options.pieces < 0 || !(options.voxel_m >= 0) || !std::isfinite(options.voxel_m) ||
+      options.smooth_px < 0)
     throw Error(
         fmt::format("scan: expected pieces, voxel_m and smooth_px of at least 0, found {}, {} and {}.",
                     options.pieces, options.voxel_m, options.smooth_px));

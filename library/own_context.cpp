@@ -7,15 +7,23 @@ namespace {
 
 // Makes what was current before current again; nothing is where it is empty.
 void restore(const limn::device::EglCurrent& before, void* own_display) {
-  limn::device::make_egl_current(before.context ? before : limn::device::EglCurrent{.display = own_display});
+  limn::device::EglCurrent wanted = before;
+  if (!before.context) wanted.display = own_display;
+  limn::device::make_egl_current(wanted);
+  limn::device::bind_egl_api(before);
 }
 
 }  // namespace
 
 OwnContext::OwnContext() {
   const limn::device::EglCurrent before = limn::device::egl_current();
-  context_.emplace(value_of(limn::device::GlContext::create()));
-  handles_ = limn::device::egl_current();
+  try {
+    context_.emplace(value_of(limn::device::GlContext::create()));
+    handles_ = limn::device::egl_current();
+  } catch (...) {
+    restore(before, limn::device::egl_current().display);
+    throw;
+  }
   restore(before, handles_.display);
 }
 

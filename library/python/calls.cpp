@@ -13,7 +13,7 @@ namespace limn::python {
 namespace {
 
 constexpr std::chrono::milliseconds k_between_signals{50};
-constexpr std::chrono::seconds k_end_waits_for_calls{5};
+constexpr std::chrono::seconds k_end_waits_for_calls{30};
 
 // All calls of the library, for the program's end.
 struct Calls {
@@ -146,7 +146,7 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
                          std::string(py::str(py::type::handle_of(progress).attr("__name__"))) + ".");
   Exchange exchange(!progress.is_none());
   std::exception_ptr failure;
-  std::optional<py::error_already_set> raised;
+  std::exception_ptr raised;
   auto in_progress = without_gil([] { return std::make_shared<const CallInProgress>(); });
   const Worker worker(&exchange, std::move(in_progress), [&] {
     try {
@@ -162,15 +162,15 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
     if (goes_on) {
       try {
         goes_on = is_going_on(progress, at);
-      } catch (py::error_already_set& error) {
-        raised.emplace(error);
+      } catch (...) {
+        raised = std::current_exception();
         goes_on = false;
       }
     }
     if (at || !goes_on) exchange.answer(goes_on);
   }
   without_gil([] {});  // a thread of a program that has ended meanwhile stays here
-  if (raised) throw *raised;
+  if (raised) std::rethrow_exception(raised);
   if (failure) std::rethrow_exception(failure);
 }
 
@@ -216,12 +216,8 @@ void set_python_log(const py::object& log) {
   const auto before = py::reinterpret_steal<py::object>(g_log);
   g_log = log.is_none() ? nullptr : py::object(log).release().ptr();
   g_is_logged = g_log != nullptr;
-  without_gil([&] {
-    if (g_is_logged)
-      limn::set_log(log_to_python);
-    else
-      limn::set_log({});
-  });
+  // Stays set: g_log alone decides, so that two threads may set it.
+  if (g_is_logged) without_gil([] { limn::set_log(log_to_python); });
 }
 
 }  // namespace

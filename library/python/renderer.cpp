@@ -213,8 +213,9 @@ void add_renderer(py::module_& module) {
   const RendererOptions defaults;
   py::class_<SharedRenderer> type(
       module, "Renderer",
-      R"(Draws a posed scene for a rig, pixel for pixel what `limn render` writes. Threads that share one
-wait for each other.
+      R"(Draws a posed scene for a rig. Projector images are, pixel for pixel, what `limn render` writes. In views
+and composites this holds for a renderer's first one; after that only what moved is drawn again, and pixels on its
+outline may differ, as they would with other samples. Threads that share one wait for each other.
 
     renderer = limn.Renderer(scene, rig)
     image = renderer.draw_projector(0, posed, scene.viewer(posed, rig)))");

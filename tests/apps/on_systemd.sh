@@ -11,9 +11,19 @@ if [ "${1:-}" != --inside ]; then
   done
   [ "$(id -u)" -eq 0 ] || skip "only root may make control groups"
   [ -s /etc/machine-id ] || skip "expected a machine's number in /etc/machine-id, found none"
+  # The mounts below end with this program.
+  unshare --mount true 2>/dev/null || skip "no right to mount"
+  [ -n "${LIMN_TEST_OWN_MOUNTS:-}" ] || LIMN_TEST_OWN_MOUNTS=yes exec unshare --mount "$0" "$@"
+  clean_up() {
+    find "${group:-/nowhere}" -depth -type d -exec rmdir {} + 2>/dev/null
+    umount "$folder/groups" 2>/dev/null
+    rm -rf --one-file-system "$folder"
+  }
+  trap clean_up EXIT
+  trap 'exit 130' INT TERM
   folder="$(mktemp -d)" && mkdir -m 700 "$folder/home" "$folder/groups"
   # Version 2 of the control groups, wherever this machine has them.
-  mount -t cgroup2 none "$folder/groups" 2>/dev/null || { rm -rf "$folder" && skip "no control groups"; }
+  mount -t cgroup2 none "$folder/groups" 2>/dev/null || skip "no control groups"
   group="$folder/groups/limn-test-$$" service=user.slice/user-0.slice/user@0.service
   result=77
   if mkdir -p "$group/$service" 2>/dev/null; then
@@ -21,10 +31,7 @@ if [ "${1:-}" != --inside ]; then
     (echo "$BASHPID" >"$group/cgroup.procs" && LIMN_TEST_FOLDER="$folder" LIMN_TEST_GROUP="$service" exec unshare --mount \
       --cgroup --pid --fork --kill-child --mount-proc "$0" --inside "$@")
     result=$?
-    find "$group" -depth -type d -exec rmdir {} + 2>/dev/null
   fi
-  umount "$folder/groups"
-  rm -rf --one-file-system "$folder"
   [ $result -ne 77 ] || skip "the manager could not be started"
   exit $result
 fi

@@ -56,15 +56,17 @@ TEST(OpenCamera, NetworkSourcesGoToTheirOwnReaders) {
 }
 
 TEST(OpenCamera, ALoginIsInNoMessage) {
-  // A password may have a slash, and a path an @.
+  // A password may have a slash or an @, so that an @ in a path may be in a password, too.
   for (const auto& [source, shown] : {std::pair{"http://sam:pa/ss@127.0.0.1:1/x", "http://127.0.0.1:1/x)"},
-                                      {"http://sam:pass@127.0.0.1:1/x@y", "http://127.0.0.1:1/x@y)"}}) {
+                                      {"http://sam:pass@127.0.0.1:1/x@y", "http://y)"},
+                                      {"http://127.0.0.1:1/x?pwd=secret", "http://127.0.0.1:1/x?…)"}}) {
     const auto closed = open_camera({.source = source, .limit_s = 0.1});
     ASSERT_FALSE(closed);
     expect_contains(closed.message(), shown);
     expect_contains(closed.message(), "expected an image");
   }
-  for (const char* source : {"https://sam:pa/ss@127.0.0.1/x", "ftp://sam:pa/ss@127.0.0.1/x"}) {
+  for (const char* source : {"https://sam:pa/ss@127.0.0.1/x", "ftp://sam:pa/ss@127.0.0.1/x",
+                             "ftp://sam:12/ss@127.0.0.1/x", "ftp://sam:p@x/ss@127.0.0.1/x"}) {
     const auto other = open_camera({.source = source, .limit_s = 0.1});
     ASSERT_FALSE(other);
     EXPECT_EQ(other.message().find("ss@"), std::string::npos) << other.message();

@@ -87,6 +87,10 @@ TEST_F(LibraryRenderer, LeavesTheThreadsContextAndMayBeUsedByAnotherThread) {
     EXPECT_EQ(renderer->draw_view(rig.cameras()[0], posed).pixels, here.pixels);
     renderer.reset();
     EXPECT_EQ(eglGetCurrentContext(), EGL_NO_CONTEXT);
+    // A program that uses OpenGL ES in this thread.
+    eglBindAPI(EGL_OPENGL_ES_API);
+    const api::Renderer another(scene, rig);
+    EXPECT_EQ(eglQueryAPI(), static_cast<EGLenum>(EGL_OPENGL_ES_API));
   }).join();
   EXPECT_EQ(eglGetCurrentContext(), before);
 }

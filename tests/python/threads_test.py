@@ -197,17 +197,18 @@ print(len(lines) >= 20)
 
 class ProgramsEnd(unittest.TestCase):
     def test_while_daemon_threads_work(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
         code = f"""
-import limn, tempfile, threading, time
+import limn, threading, time
 image = limn.read_image({str(INPUTS / "video/image0.png")!r}, "grey")
 def detect():
     detector = limn.Detector(["apriltag_36h11"])
     while True:
         detector.detect(image)
 def solve():
-    with tempfile.TemporaryDirectory() as folder:
-        while True:
-            limn.solve({str(INPUTS / "photographs")!r}, folder + "/rig", cameras_only=True, board={BOARD!r})
+    while True:
+        limn.solve({str(INPUTS / "photographs")!r}, {folder.name + "/rig"!r}, cameras_only=True, board={BOARD!r})
 for work in (detect, detect, solve):
     threading.Thread(target=work, daemon=True).start()
 time.sleep(0.2)

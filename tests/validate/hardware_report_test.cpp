@@ -183,7 +183,10 @@ void expect_report_without_light(const std::string& display) {
   EXPECT_EQ(refused.code, 1);
   expect_contains(refused.err, "camera0: expected the board in at least 3 poses, found it in 0.");
 
-  // The same folder with other devices is refused.
+  // The same folder with names, or with other devices, is refused.
+  options.with_names = true;
+  expect_contains(run_report(options).err, "expected this report to be continued without --with-names");
+  options.with_names = false;
   options.board = "charuco:8x6:20mm";
   expect_contains(run_report(options).err,
                   "expected the devices, board and rig that this report was begun with");

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 
 #include "core/file.h"
@@ -60,6 +61,12 @@ TEST(PrivateWords, VersionsNumbersAndTimesStay) {
   const std::string image = "<img src='data:image/jpeg;base64,ab/10.0.0.1+sam/fe80==' alt='10.0.0.1'>";
   EXPECT_EQ(words.without(image),
             "<img src='data:image/jpeg;base64,ab/10.0.0.1+sam/fe80==' alt='(address)'>");
+}
+
+TEST(PrivateWords, FormsThatAreTooShortAreNotReplaced) {
+  PrivateWords words;
+  words.add("%20", "(path)");  // a blank
+  EXPECT_EQ(words.without("a b c"), "a b c");
 }
 
 TEST(PrivateFacts, DevicesAddTheirAddressesLoginsAndSerialNumbers) {
@@ -126,6 +133,23 @@ TEST(CleanFolder, TakesPrivateWordsOutOfAllFilesAndRemovesWhatIsNotNeeded) {
   EXPECT_TRUE(fs::exists(folder / "scene/door.glb"));
 }
 
+TEST(CleanFolder, KeepsKeysAndNumbersOfJsonFiles) {
+  const fs::path folder = test::test_folder();
+  PrivateWords words;
+  words.add("green", "(user)");
+  words.add("12345678", "(serial)");
+  ASSERT_TRUE(write_file(folder / "a.json", R"({"green": 12345678, "who": "green 12345678"})"));
+  ASSERT_TRUE(write_file(folder / "b.jsonl", "{\"green\":12345678}\n{\"who\":\"Green\"}\n"));
+  ASSERT_TRUE(write_file(folder / "same.json", "{ \"green\":12345678 }"));
+  ASSERT_TRUE(write_file(folder / "damaged.JPG", "\xFF\xD8 by green"));
+  ASSERT_TRUE(clean_folder(folder, words));
+  EXPECT_EQ(nlohmann::json::parse(read_file(folder / "a.json").value()),
+            nlohmann::json({{"green", 12345678}, {"who", "(user) (serial)"}}));
+  EXPECT_EQ(read_file(folder / "b.jsonl").value(), "{\"green\":12345678}\n{\"who\":\"(user)\"}\n");
+  EXPECT_EQ(read_file(folder / "same.json").value(), "{ \"green\":12345678 }");
+  EXPECT_FALSE(fs::exists(folder / "damaged.JPG"));
+}
+
 TEST(ImageMetadata, AJpegLosesCommentsAndExifAndKeepsItsPixels) {
   const auto segment = [](char marker, const std::string& content) {
     const auto length = static_cast<char>(content.size() + 2);
@@ -135,11 +159,11 @@ TEST(ImageMetadata, AJpegLosesCommentsAndExifAndKeepsItsPixels) {
                     exif = segment('\xE1', "Exif samantha"), comment = segment('\xFE', "by samantha"),
                     adobe = segment('\xEE', "Adobe"), table = segment('\xDB', "quantization"),
                     pixels = segment('\xDA', "scan") + "pixels\xFF\xD9";
-  EXPECT_EQ(without_metadata(start + jfif + exif + comment + adobe + table + pixels + "samantha"),
+  EXPECT_EQ(without_metadata(start + jfif + exif + comment + adobe + table + pixels + "samantha").value(),
             start + jfif + adobe + table + pixels);
-  EXPECT_EQ(without_metadata(start + jfif + table + pixels), std::nullopt);
-  EXPECT_EQ(without_metadata("no image"), std::nullopt);
-  EXPECT_EQ(without_metadata(start + exif.substr(0, 8)), std::nullopt);  // truncated
+  EXPECT_EQ(without_metadata(start + jfif + table + pixels).value(), std::nullopt);
+  EXPECT_FALSE(without_metadata("no image"));
+  EXPECT_FALSE(without_metadata(start + exif.substr(0, 8)));  // truncated
 }
 
 }  // namespace

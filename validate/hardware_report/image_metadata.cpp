@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string_view>
+#include <utility>
 
 namespace limn::validate {
 namespace {
@@ -16,12 +17,12 @@ bool is_metadata(std::uint8_t marker) {
 
 // Segments are FF, marker, length (2 bytes, with themselves), content, up to the pixels (SOS). What follows
 // the end of the image goes, too.
-std::optional<std::string> jpeg_without(std::string_view jpeg) {
+Result<std::optional<std::string>> jpeg_without(std::string_view jpeg) {
   constexpr std::uint8_t k_pixels = 0xDA;
   std::string out(jpeg.substr(0, 2));
   bool is_changed = false;
   for (std::size_t at = 2; at + 4 <= jpeg.size();) {
-    if (byte_at(jpeg, at) != 0xFF) return std::nullopt;
+    if (byte_at(jpeg, at) != 0xFF) break;
     const std::uint8_t marker = byte_at(jpeg, at + 1);
     if (marker == 0xFF) {  // a fill byte
       ++at;
@@ -32,23 +33,24 @@ std::optional<std::string> jpeg_without(std::string_view jpeg) {
       const std::size_t last = end == std::string_view::npos || end < at ? jpeg.size() : end + 2;
       is_changed = is_changed || last < jpeg.size();
       out += jpeg.substr(at, last - at);
-      return is_changed ? std::optional(out) : std::nullopt;
+      return is_changed ? std::optional(std::move(out)) : std::nullopt;
     }
     const std::size_t length = 2 + 256U * byte_at(jpeg, at + 2) + byte_at(jpeg, at + 3);
-    if (length < 4 || at + length > jpeg.size()) return std::nullopt;
+    if (length < 4 || at + length > jpeg.size()) break;
     if (is_metadata(marker))
       is_changed = true;
     else
       out += jpeg.substr(at, length);
     at += length;
   }
-  return std::nullopt;
+  return error("expected a JPEG image, found other or damaged bytes.");
 }
 
 }  // namespace
 
-std::optional<std::string> without_metadata(const std::string& jpeg) {
-  return jpeg.starts_with("\xFF\xD8") ? jpeg_without(jpeg) : std::nullopt;
+Result<std::optional<std::string>> without_metadata(const std::string& jpeg) {
+  if (!jpeg.starts_with("\xFF\xD8")) return error("expected a JPEG image, found another file.");
+  return jpeg_without(jpeg);
 }
 
 }  // namespace limn::validate

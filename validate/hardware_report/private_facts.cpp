@@ -132,7 +132,8 @@ void add_serials(PrivateWords* words, const fs::path& root) {
 // The parts of SCHEME://[NAME:PASSWORD@]HOST[:PORT][/PATH][?QUERY]. A password may have slashes.
 void add_url(PrivateWords* words, const std::string& source, std::size_t mark) {
   words->add(source, source.substr(0, mark + 3) + "(address)");
-  words->add(device::without_login(source), source.substr(0, mark + 3) + "(address)");
+  const std::string shown = source.substr(0, source.find('?'));
+  words->add(device::without_login(shown), source.substr(0, mark + 3) + "(address)");
   std::string rest = source.substr(mark + 3);
   if (const std::size_t at = rest.substr(0, rest.find('?')).rfind('@'); at != std::string::npos) {
     const std::string login = rest.substr(0, at);

@@ -253,14 +253,14 @@ std::string without_addresses(const std::string& text) {
 }  // namespace
 
 void PrivateWords::add(const std::string& word, const std::string& by) {
-  const std::string plain = lower(word);
-  const bool is_number = std::ranges::all_of(plain, is_digit);
-  if (plain.size() < (is_number ? 6 : 3) || is_common(plain)) return;
   const std::string in_json = json_text(nlohmann::ordered_json(word));
   for (const std::string& form : {word, in_json.substr(1, in_json.size() - 2), escaped(word),
-                                  percent_decoded(word), percent_encoded(word)})
-    if (std::pair one{lower(form), by}; std::ranges::find(replaced_, one) == replaced_.end())
-      replaced_.push_back(one);
+                                  percent_decoded(word), percent_encoded(word)}) {
+    const std::pair one{lower(form), by};
+    const bool is_number = std::ranges::all_of(one.first, is_digit);
+    if (one.first.size() < (is_number ? 6 : 3) || is_common(one.first)) continue;
+    if (std::ranges::find(replaced_, one) == replaced_.end()) replaced_.push_back(one);
+  }
   // The longest first: a path before the user's name in it.
   std::ranges::stable_sort(replaced_,
                            [](const auto& a, const auto& b) { return a.first.size() > b.first.size(); });
@@ -313,7 +313,7 @@ nlohmann::ordered_json PrivateWords::json_without(const nlohmann::ordered_json& 
     return out;
   }
   nlohmann::ordered_json out = nlohmann::ordered_json::object();
-  for (const auto& [key, part] : json.items()) out[without(key)] = json_without(part);
+  for (const auto& [key, part] : json.items()) out[key] = json_without(part);
   return out;
 }
 

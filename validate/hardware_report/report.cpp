@@ -87,10 +87,16 @@ class Report {
     const auto is_text = [&old](const char* key) { return !old.contains(key) || old[key].is_string(); };
     if (!old.is_object() || !is_text("schema") || old.value("schema", "") != k_schema ||
         !old.contains("steps") || !old["steps"].is_object() || !is_text("begun") || !is_text("devices") ||
-        !is_text("devices_mark") ||
+        !is_text("devices_mark") || (old.contains("with_names") && !old["with_names"].is_boolean()) ||
         !std::ranges::all_of(old["steps"], [](const auto& step) { return step.is_object(); }))
       return error("{}: expected a report of limn doctor ({}), found something else. Use another folder.",
                    file().string(), k_schema);
+    if (old.value("with_names", false) != options_.with_names)
+      return error(
+          "{}: expected this report to be continued {} --with-names, as it was begun, found the other. Use "
+          "another folder for a report {} names.",
+          options_.folder.string(), options_.with_names ? "without" : "with",
+          options_.with_names ? "with" : "without");
     report_["begun"] = old.value("begun", "");
     report_["steps"] = old["steps"];
     begun_on_ = old.value("devices", "");
@@ -111,6 +117,7 @@ class Report {
     if (!options_.with_names) rename_private(&chosen_, &words_);
     report_["devices"] = chosen_.is_virtual() ? "virtual rig" : "devices of this machine";
     report_["devices_mark"] = devices_mark(chosen_, options_.rig);
+    report_["with_names"] = options_.with_names;
     if (begun_mark_.empty() || begun_mark_ == report_["devices_mark"]) return {};
     return error(
         "{}: expected the devices, board and rig that this report was begun with ({}), found others ({}). A "

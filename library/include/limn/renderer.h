@@ -124,8 +124,9 @@ enum class Composite {
   full
 };
 
-/// Draws a posed scene for a rig, pixel for pixel what `limn render` writes. Use it from one thread at a
-/// time.
+/// Draws a posed scene for a rig. Projector images are, pixel for pixel, what `limn render` writes. In views
+/// and composites this holds for a renderer's first one; after that only what moved is drawn again, and
+/// pixels on its outline may differ, as they would with other samples. Use it from one thread at a time.
 ///
 ///     limn::Renderer renderer(scene, rig);
 ///     const limn::Image image = renderer.draw_projector(0, posed, scene.viewer(posed, rig));

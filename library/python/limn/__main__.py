@@ -9,10 +9,10 @@ import sys
 def find_program():
     """The program's path; None if there is none."""
     package = pathlib.Path(__file__).resolve().parent
-    for folder in package.parents:  # PREFIX/lib/…/limn, or BUILD/python/limn
-        for program in (folder / "bin" / "limn", folder / "limn"):
-            if program.is_file() and os.access(program, os.X_OK):
-                return program
+    build, prefix = package.parents[1], package.parents[3:4]  # BUILD/python/limn, PREFIX/lib/python3/dist-packages/limn
+    for program in (build / "limn", *(folder / "bin" / "limn" for folder in prefix)):
+        if program.is_file() and os.access(program, os.X_OK):
+            return program
     return shutil.which("limn")
 
 
