@@ -4,9 +4,9 @@
 
 #include "core/file.h"
 #include "core/print.h"
-#include "design/design_report.h"
-#include "design/plan_page.h"
-#include "design/rig_design.h"
+#include "wizard/design/design_report.h"
+#include "wizard/design/plan_page.h"
+#include "wizard/design/rig_design.h"
 
 namespace limn::apps {
 

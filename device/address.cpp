@@ -52,15 +52,15 @@ Result<Address> parse_address(const std::string& url,
   return address;
 }
 
-// A login may have any letters: it ends at the last @ of the whole address but its query.
+// A login may have any letters: it ends at the last @ of the whole address.
 std::string without_login(const std::string& source) {
   const std::size_t scheme = source.find("://");
   if (scheme == std::string::npos) return source;
-  const std::size_t begin = scheme + 3, query = source.find('?', begin);
-  std::string shown = source.substr(0, query);
-  if (const std::size_t at = shown.rfind('@'); at != std::string::npos && at >= begin)
-    shown.erase(begin, at + 1 - begin);
-  return query == std::string::npos ? shown : shown + "?…";
+  const std::size_t begin = scheme + 3, at = source.rfind('@');
+  std::string rest = source.substr(at == std::string::npos || at < begin ? begin : at + 1);
+  if (const std::size_t query = rest.find('?'); query != std::string::npos)
+    rest.replace(query, rest.npos, "?…");
+  return source.substr(0, begin) + rest;
 }
 
 }  // namespace limn::device

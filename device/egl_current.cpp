@@ -13,13 +13,20 @@ EglCurrent egl_current() {
 }
 
 bool make_egl_current(const EglCurrent& wanted) {
-  // Each API has a current context of its own.
-  eglBindAPI(wanted.context && wanted.api != 0 ? wanted.api : EGL_OPENGL_API);
-  return eglMakeCurrent(wanted.display, wanted.draw_surface, wanted.read_surface, wanted.context) == EGL_TRUE;
+  const EGLenum api_before = eglQueryAPI();
+  eglBindAPI(EGL_OPENGL_API);
+  if (eglMakeCurrent(wanted.display, wanted.draw_surface, wanted.read_surface, wanted.context)) return true;
+  eglBindAPI(api_before);
+  return false;
 }
 
-void bind_egl_api(const EglCurrent& before) {
-  if (before.api != 0) eglBindAPI(before.api);
+void restore_egl_current(const EglCurrent& before) {
+  if (before.api == 0) return;
+  eglBindAPI(EGL_OPENGL_API);  // whose context is released; those of OpenGL and OpenGL ES replace each other
+  const EGLDisplay display = before.context ? before.display : eglGetCurrentDisplay();
+  if (display != EGL_NO_DISPLAY)
+    eglMakeCurrent(display, before.draw_surface, before.read_surface, before.context);
+  eglBindAPI(before.api);
 }
 
 }  // namespace limn::device

@@ -118,16 +118,35 @@ std::vector<Body> public_of(const std::vector<limn::Body>& bodies) {
   return list;
 }
 
+namespace {
+
+limn::TrackingState to_room(Tracking tracking) {
+  switch (tracking) {
+    case Tracking::measured:
+      return limn::TrackingState::measured;
+    case Tracking::extrapolated:
+      return limn::TrackingState::extrapolated;
+    case Tracking::lost:
+      return limn::TrackingState::lost;
+  }
+  throw Error("track: expected measured, extrapolated or lost, found another number.");
+}
+
+}  // namespace
+
 limn::Track room_of(const Track& track) {
   limn::Track out;
   out.body = track.body;
   out.world_from_body = LIMN_VERSIONED::to_room(track.world_from_body);
   for (int i = 0; i < 36; ++i) out.covariance(i / 6, i % 6) = track.covariance[static_cast<std::size_t>(i)];
+  if (!out.covariance.allFinite())
+    throw Error(
+        fmt::format("track of '{}': expected a covariance of finite numbers, found others.", track.body));
   out.marker_count = track.marker_count;
   out.rms_px = track.rms_px;
   out.captured_at = stamp_of(track.captured_at_s);
   out.at = stamp_of(track.at_s);
-  out.tracking = static_cast<limn::TrackingState>(track.tracking);
+  out.tracking = to_room(track.tracking);
   return out;
 }
 

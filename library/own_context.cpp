@@ -3,17 +3,6 @@
 #include "library/convert.h"
 
 namespace limn::LIMN_VERSIONED {
-namespace {
-
-// Makes what was current before current again; nothing is where it is empty.
-void restore(const limn::device::EglCurrent& before, void* own_display) {
-  limn::device::EglCurrent wanted = before;
-  if (!before.context) wanted.display = own_display;
-  limn::device::make_egl_current(wanted);
-  limn::device::bind_egl_api(before);
-}
-
-}  // namespace
 
 OwnContext::OwnContext() {
   const limn::device::EglCurrent before = limn::device::egl_current();
@@ -21,10 +10,10 @@ OwnContext::OwnContext() {
     context_.emplace(value_of(limn::device::GlContext::create()));
     handles_ = limn::device::egl_current();
   } catch (...) {
-    restore(before, limn::device::egl_current().display);
+    limn::device::restore_egl_current(before);
     throw;
   }
-  restore(before, handles_.display);
+  limn::device::restore_egl_current(before);
 }
 
 OwnContext::Scope::Scope(const OwnContext* context) : context_(context) {
@@ -38,7 +27,7 @@ OwnContext::Scope::Scope(const OwnContext* context) : context_(context) {
 }
 
 OwnContext::Scope::~Scope() {
-  if (context_) restore(before_, context_->handles_.display);
+  if (context_) limn::device::restore_egl_current(before_);
 }
 
 }  // namespace limn::LIMN_VERSIONED

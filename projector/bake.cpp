@@ -27,7 +27,7 @@ cv::Mat tangents_every(const Imager& imager, int step) {
   return tangents;
 }
 
-// Reads the table bilinearly, as projector/shaders/lens.glsl does.
+// Reads the table bilinearly, as shaders/lens.glsl does.
 Eigen::Vector2d read(const cv::Mat& tangents, int step, const Eigen::Vector2d& px) {
   const Eigen::Vector2d node = px / step;
   const int x = static_cast<int>(node.x()), y = static_cast<int>(node.y());

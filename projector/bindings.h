@@ -2,6 +2,6 @@
 
 namespace limn::projector {
 
-#include "projector/shaders/bindings.glsl"
+#include "shaders/bindings.glsl"
 
 }  // namespace limn::projector

@@ -8,7 +8,7 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_nodes = 32;        // as in projector/shaders/shading.glsl
+constexpr int k_nodes = 32;        // as in shaders/shading.glsl
 constexpr int k_samples = 512;     // samples for each node; 16 times as many change no level in renderer_test
 constexpr double k_horizon = 0.3;  // height at which all light counts as light from above
 constexpr double k_least_roughness = 0.03, k_least_cosine = 1e-3, k_most_cosine = 0.999;

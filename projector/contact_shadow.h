@@ -22,11 +22,11 @@ struct DistanceField {
 /// The grid reaches `farthest_m` beyond the mesh's bounds; larger distances are clamped to it .
 DistanceField distance_field(const scene::Mesh& mesh, double farthest_m);
 
-/// The soft shadow of parts that stand on or just above the prototype (projector/shaders/contact.glsl): how
-/// much of the uniform light from all sides they keep from a point. Nearer parts count more (obscurance:
-/// Zhukov et al. 1998, "An ambient light illumination model"). Computed by tracing cones through each part's
-/// distance field (after Wright 2015, "Dynamic occlusion with signed distance fields"). Parts of mode
-/// `surface` have no contact shadow.
+/// The soft shadow of parts that stand on or just above the prototype (shaders/contact.glsl): how much of the
+/// uniform light from all sides they keep from a point. Nearer parts count more (obscurance: Zhukov et al.
+/// 1998, "An ambient light illumination model"). Computed by tracing cones through each part's distance field
+/// (after Wright 2015, "Dynamic occlusion with signed distance fields"). Parts of mode `surface` have no
+/// contact shadow.
 class ContactShadow final : public Bindable {
  public:
   /// A part blocks less light the farther away it is; at this distance (m) it blocks none.

@@ -7,7 +7,7 @@
 namespace limn::projector {
 namespace {
 
-constexpr int k_block = 8;  // as in projector/shaders/blocks.glsl
+constexpr int k_block = 8;  // as in shaders/blocks.glsl
 
 int blocks_of(int texels) { return (texels + k_block - 1) / k_block; }
 

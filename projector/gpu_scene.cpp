@@ -18,7 +18,7 @@ namespace {
 
 constexpr int k_cluster = 128;  // triangles in a cluster
 
-// As in projector/shaders/scene.glsl.
+// As in shaders/scene.glsl.
 struct GpuMaterial {
   Eigen::Vector4f colour;      // a: 1 when unlit
   Eigen::Vector4f parameters;  // texture layer (-1 when it has none), metallic, roughness, alpha cutoff
@@ -51,7 +51,7 @@ std::size_t triangles_after_normals(const scene::Scene& scene) {
   return count;
 }
 
-// As in projector/shaders/scene.glsl.
+// As in shaders/scene.glsl.
 struct GpuTriangle {
   std::uint32_t owner = 0, material = 0;
   std::array<std::uint32_t, 3> beside = {0, 0, 0};  // ids

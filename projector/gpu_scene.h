@@ -42,7 +42,7 @@ struct PlacedRun {
   scene::MaterialOverride material = {};
 };
 
-/// All meshes of a scene on the GPU, in the layout that projector/shaders/scene.glsl reads.
+/// All meshes of a scene on the GPU, in the layout that shaders/scene.glsl reads.
 class GpuScene final : public Bindable {
  public:
   /// Number of triangles that the driver's largest texel buffer holds.

@@ -12,7 +12,7 @@ namespace {
 
 // The mask and shares of one part, counted in the output of coverage.frag.
 PartCoverage counted(const scene::PosedPart& part, const cv::Mat& labels, std::uint8_t owner) {
-  constexpr std::uint8_t k_projected = 2;  // as in projector/shaders/part_coverage.glsl
+  constexpr std::uint8_t k_projected = 2;  // as in shaders/part_coverage.glsl
   PartCoverage out{part.slot, part.variant, 0, 0, 0, cv::Mat::zeros(labels.size(), CV_8U)};
   int projected = 0;
   for (int row = 0; row < labels.rows; ++row) {

@@ -22,7 +22,7 @@ class PrototypeAlbedo final : public Bindable {
   float mean_ = 0;
 };
 
-/// The compensation of colours (compensation.h), for projector/shaders/balance.glsl.
+/// The compensation of colours (compensation.h), for shaders/balance.glsl.
 class LightBalance final : public Bindable {
  public:
   static Result<LightBalance> create(const scene::Scene& scene);

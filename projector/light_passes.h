@@ -28,9 +28,8 @@ std::vector<cv::Rect> without_overlaps(std::span<const cv::Rect> places);
 
 struct Smoothing;
 
-/// Draws the light that a projector should give (projector/shaders/light.glsl). Each pass processes a list of
-/// pixels that all need the same work. The lists take 20 bytes for each pixel, 28 where parts of both modes
-/// overlap.
+/// Draws the light that a projector should give (shaders/light.glsl). Each pass processes a list of pixels
+/// that all need the same work. The lists take 20 bytes for each pixel, 28 where parts of both modes overlap.
 class LightPasses {
  public:
   /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines); `by_measurement`:

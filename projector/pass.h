@@ -18,7 +18,7 @@ namespace limn::projector {
 class Pass {
  public:
   struct Description {
-    std::string shader;  ///< a file in projector/shaders/
+    std::string shader;  ///< a file in shaders/
     Defines defines = {};
     std::vector<Resource> reads = {};
     std::vector<Resource> writes = {};
@@ -50,7 +50,7 @@ class ComputePass : public Pass {
   /// Runs over rectangles in work groups of 16 x 4 pixels. The shader gets each rectangle as u_first and
   /// u_end.
   void run_over_rects(std::span<const cv::Rect> places, const Resources& resources) const;
-  /// Runs over a pixel list, 64 pixels in each work group (projector/shaders/work_list.glsl).
+  /// Runs over a pixel list, 64 pixels in each work group (shaders/work_list.glsl).
   void run_over_list(const PixelList& pixels, const Resources& resources) const;
 
  private:

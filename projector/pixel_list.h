@@ -8,8 +8,7 @@
 
 namespace limn::projector {
 
-/// A list of pixels on the GPU. One pass fills it, the next one processes it
-/// (projector/shaders/work_list.glsl).
+/// A list of pixels on the GPU. One pass fills it, the next one processes it (shaders/work_list.glsl).
 class PixelList final : public Bindable {
  public:
   /// Empties the list and makes room for `pixels` entries.

@@ -42,8 +42,7 @@ class ProjectorView {
   cv::Mat blend(std::size_t index, const scene::PosedScene& posed);
 
  private:
-  // What the centres of a projector's pixels see, and their blending shares
-  // (projector/shaders/hit_cache.glsl).
+  // What the centres of a projector's pixels see, and their blending shares (shaders/hit_cache.glsl).
   class HitCache final : public Bindable {
    public:
     HitCache() = default;

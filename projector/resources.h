@@ -43,8 +43,7 @@ struct Use {
   const Program& program;
 };
 
-/// Something that passes read or write. It knows its slots in projector/shaders/bindings.glsl and its
-/// uniforms.
+/// Something that passes read or write. It knows its slots in shaders/bindings.glsl and its uniforms.
 class Bindable {
  public:
   virtual void bind(const Use& use) const = 0;

@@ -10,8 +10,8 @@
 
 namespace limn::projector {
 
-/// The light that parts are shaded by (projector/shaders/shading.glsl): the room's light if it is known, else
-/// soft light and a lamp that move with the viewer.
+/// The light that parts are shaded by (shaders/shading.glsl): the room's light if it is known, else soft
+/// light and a lamp that move with the viewer.
 class RoomLighting final : public Bindable {
  public:
   explicit RoomLighting(const std::optional<scene::RoomLight>& room);

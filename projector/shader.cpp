@@ -17,7 +17,7 @@ struct Unrolled {
 Status unroll(const std::string& file, Unrolled* out) {
   const auto found = embedded_shaders().find(file);
   if (found == embedded_shaders().end())
-    return error("projector/shaders/{}: expected this file, found none. Build again.", file);
+    return error("shaders/{}: expected this file, found none. Build again.", file);
   const std::size_t number = out->files.size();
   out->files.push_back(file);
   std::istringstream lines(found->second);
@@ -41,8 +41,7 @@ Status unroll(const std::string& file, Unrolled* out) {
 
 std::string numbered(const std::vector<std::string>& files) {
   std::string text;
-  for (std::size_t i = 0; i < files.size(); ++i)
-    text += fmt::format("{} is projector/shaders/{}; ", i, files[i]);
+  for (std::size_t i = 0; i < files.size(); ++i) text += fmt::format("{} is shaders/{}; ", i, files[i]);
   return text;
 }
 
@@ -64,8 +63,8 @@ Result<GlName> compile(GLenum stage, const std::string& file, Defines defines = 
   if (ok) return shader;
   char message[4096] = "";
   glGetShaderInfoLog(*shader, sizeof(message), nullptr, message);
-  return error("projector/shaders/{}: the graphics driver does not compile it ({}): {}", file,
-               numbered(source.files), message);
+  return error("shaders/{}: the graphics driver does not compile it ({}): {}", file, numbered(source.files),
+               message);
 }
 
 // Calls `use` with the name and location of each uniform. Uniforms in blocks are skipped, because they have
@@ -116,7 +115,7 @@ Result<Program> Program::link(std::span<const GlName> shaders, const std::string
   }
   char message[4096] = "";
   glGetProgramInfoLog(*program.name_, sizeof(message), nullptr, message);
-  return error("projector/shaders/{}: the graphics driver does not link: {}", files, message);
+  return error("shaders/{}: the graphics driver does not link: {}", files, message);
 }
 
 GLint Program::location_of(std::string_view uniform) const {

@@ -15,16 +15,16 @@
 
 namespace limn::projector {
 
-/// File name -> text of all files in projector/shaders/, embedded in the program at build time.
+/// File name -> text of all files in shaders/, embedded in the program at build time.
 const std::map<std::string, std::string>& embedded_shaders();
 
 /// A linked vertex and fragment shader, or a compute shader. The locations of its uniforms are read once,
 /// when it is linked.
 class Program {
  public:
-  /// Links files of projector/shaders/. The first `#include "x.glsl"` of a file is replaced by its text,
-  /// further ones by nothing. `#line` directives make the driver's messages name the true line. Error: the
-  /// driver's message with file names.
+  /// Links files of shaders/. The first `#include "x.glsl"` of a file is replaced by its text, further ones
+  /// by nothing. `#line` directives make the driver's messages name the true line. Error: the driver's
+  /// message with file names.
   static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
 
   /// The same for a compute shader, compiled with `defines`.

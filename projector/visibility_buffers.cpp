@@ -15,7 +15,7 @@ constexpr double k_oversampling = 1.5;
 constexpr int k_viewer_ids_side = 2560;
 // Nodes of the pixel maps. A cell is 4 to 5 px wide; interpolation differs from the lens by at most 0.01 px.
 constexpr int k_map_columns = 321, k_map_rows = 241;
-constexpr double k_on_surface = 0.002;  // m, as in projector/shaders/on_surface.glsl
+constexpr double k_on_surface = 0.002;  // m, as in shaders/on_surface.glsl
 // Share of the image's smaller side over which a projector fades towards its border.
 constexpr double k_soft_border = 0.1;
 

@@ -23,11 +23,11 @@ struct GpuLens final : public Bindable {
   void bind(const Use& use) const override;
 };
 
-/// Images of triangle ids (projector/shaders/ids.frag) from all projectors and from one viewer or camera,
-/// with the poses of these viewpoints, as projector/shaders/scene.glsl reads them. Layer 2 i of the
-/// projectors' ids is the prototype, layer 2 i + 1 the surface parts; layer 0 of the viewer's ids is the
-/// prototype, layer 1 the parts. The layer after the projectors' is for the reference camera, which measured
-/// the prototype and keeps its pose in the scene's frame.
+/// Images of triangle ids (shaders/ids.frag) from all projectors and from one viewer or camera, with the
+/// poses of these viewpoints, as shaders/scene.glsl reads them. Layer 2 i of the projectors' ids is the
+/// prototype, layer 2 i + 1 the surface parts; layer 0 of the viewer's ids is the prototype, layer 1 the
+/// parts. The layer after the projectors' is for the reference camera, which measured the prototype and keeps
+/// its pose in the scene's frame.
 class VisibilityBuffers final : public Bindable {
  public:
   static Result<VisibilityBuffers> create(const Rig& rig);

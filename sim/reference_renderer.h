@@ -28,9 +28,9 @@ struct DepthOrder {
 };
 
 /// A ray tracer that computes which light should fall on the prototype, and how the parts look in an imager.
-/// It is the reference for projector/: it follows the same conventions (scene/scene.h,
-/// projector/shaders/shading.glsl), but shares no code with it. Only the prototype occludes and casts
-/// shadows. Borrows the world and its scene's meshes, which must outlive it unchanged.
+/// It is the reference for projector/: it follows the same conventions (scene/scene.h, shaders/shading.glsl),
+/// but shares no code with it. Only the prototype occludes and casts shadows. Borrows the world and its
+/// scene's meshes, which must outlive it unchanged.
 class ReferenceRenderer {
  public:
   /// `view` parts are drawn for `viewer`. If no room light is given, the lamp that shades the parts stands

@@ -72,7 +72,7 @@ build() {
   local target="$1" folder="$root/build/release" stamp="$root/build/release/.built-$1"
   local packages=("$root/packages.txt")
   local sources=(CMakeLists.txt CMakePresets.json packages.txt tools core scene device calib tracker projector
-    sim exchange design wizard session remote nodes validate apps library)
+    shaders sim exchange wizard session remote nodes validate apps library)
   case "$target" in all | *_bench) sources+=(tests) ;; esac
   case "$target" in all) packages+=("$root/tests/packages.txt") ;; esac
   if [ -e "$stamp" ] && [ -z "$(cd "$root" && find "${sources[@]}" -newer "$stamp" -print -quit)" ]; then

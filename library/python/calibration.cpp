@@ -14,8 +14,8 @@ using Texts = std::vector<std::string>;
 constexpr const char* k_progress =
     R"(progress(limn.Progress) is called by the calling thread when a stage begins and after its steps. If
 it returns False, the call raises limn.Stopped, at latest when the stage ends; what it raises, and
-KeyboardInterrupt, end the call in the same way. Nothing is written then, unless it was writing already. Other threads of Python
-run meanwhile. )";
+KeyboardInterrupt, end the call in the same way. Nothing is written then, unless it was writing
+already. Other threads of Python run meanwhile. )";
 
 void add_results_of_solve(py::module_& module) {
   Record<DeviceQuality>(module, "DeviceQuality", "How well one camera or projector is known.")

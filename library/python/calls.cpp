@@ -24,10 +24,13 @@ struct Calls {
 };
 
 // It is never destroyed, because threads may wait in it when the program ends.
-Calls& calls() {
-  static auto* const all = new Calls;
-  return *all;
-}
+Calls* g_calls = new Calls;
+
+Calls& calls() { return *g_calls; }
+
+// In the child of os.fork(), which has none of the other threads: their calls never end there, and one of
+// them may have held the mutex.
+void forget_calls() { g_calls = new Calls; }
 
 bool is_program_ending() {
   const std::lock_guard lock(calls().mutex);
@@ -162,7 +165,7 @@ void run_stoppable(const py::object& progress, const std::function<void(const Re
     if (goes_on) {
       try {
         goes_on = is_going_on(progress, at);
-      } catch (...) {
+      } catch (const std::exception&) {  // pthread_exit in a thread that Python ends must pass
         raised = std::current_exception();
         goes_on = false;
       }
@@ -250,6 +253,8 @@ void add_log(py::module_& module) {
       R"(Sets who gets the notes and warnings that the program prints to stderr, for example that the unit of
 a mesh was guessed: log(is_warning, line), or None for nobody, which is the default. Several threads
 may call it. What it raises goes to sys.unraisablehook. It ends by itself when the interpreter does.)");
+  py::module_::import("os").attr("register_at_fork")(py::arg("after_in_child") =
+                                                         py::cpp_function(&forget_calls));
   py::module_::import("atexit").attr("register")(py::cpp_function([] {
     set_python_log(py::none());
     PyThreadState* const state = PyEval_SaveThread();

@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "core/file.h"
-#include "design/rig_description.h"
 #include "tests/support/run_limn.h"
+#include "wizard/design/rig_description.h"
 
 namespace limn::apps {
 namespace {

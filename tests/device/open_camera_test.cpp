@@ -65,8 +65,9 @@ TEST(OpenCamera, ALoginIsInNoMessage) {
     expect_contains(closed.message(), shown);
     expect_contains(closed.message(), "expected an image");
   }
-  for (const char* source : {"https://sam:pa/ss@127.0.0.1/x", "ftp://sam:pa/ss@127.0.0.1/x",
-                             "ftp://sam:12/ss@127.0.0.1/x", "ftp://sam:p@x/ss@127.0.0.1/x"}) {
+  for (const char* source :
+       {"https://sam:pa/ss@127.0.0.1/x", "ftp://sam:pa/ss@127.0.0.1/x", "ftp://sam:12/ss@127.0.0.1/x",
+        "ftp://sam:pa?ss@127.0.0.1/x", "ftp://sam:p@x/ss@127.0.0.1/x"}) {
     const auto other = open_camera({.source = source, .limit_s = 0.1});
     ASSERT_FALSE(other);
     EXPECT_EQ(other.message().find("ss@"), std::string::npos) << other.message();

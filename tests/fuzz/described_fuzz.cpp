@@ -1,6 +1,6 @@
 // Descriptions of rigs that are to be bought.
-#include "design/rig_description.h"
 #include "tests/fuzz/fuzz_file.h"
+#include "wizard/design/rig_description.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   using namespace limn;

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/file.h"
 #include "library/body_conversion.h"
 #include "library/convert.h"
@@ -84,6 +86,16 @@ TEST(LibraryBodies, AreLocatedInOneMoment) {
     EXPECT_NEAR(p[static_cast<std::size_t>(k)], test::world_from_example_body(2).translation[k], 1e-6);
   const api::View without_camera{nullptr, markers};
   EXPECT_THROW(api::locate_bodies(api::public_of({test::example_body()}), {&without_camera, 1}), api::Error);
+}
+
+TEST(LibraryBodies, TracksOfTheCallerAreChecked) {
+  api::Track track{.body = "tool", .tracking = api::Tracking::lost};
+  EXPECT_EQ(api::room_of(track).tracking, TrackingState::lost);
+  track.tracking = static_cast<api::Tracking>(3);
+  EXPECT_THROW(api::room_of(track), api::Error);
+  track.tracking = api::Tracking::measured;
+  track.covariance[7] = std::nan("");
+  EXPECT_THROW(api::room_of(track), api::Error);
 }
 
 TEST(LibraryBodies, AreReadAndChecked) {

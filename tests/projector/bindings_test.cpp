@@ -36,7 +36,7 @@ std::map<std::string, std::string> sources(const std::string& folder, const std:
 }
 
 std::map<std::string, std::string> shaders() {
-  return sources("projector/shaders", {".glsl", ".comp", ".frag", ".vert"});
+  return sources("shaders", {".glsl", ".comp", ".frag", ".vert"});
 }
 std::map<std::string, std::string> cpp_files() { return sources("projector", {".h", ".cpp"}); }
 
@@ -47,7 +47,7 @@ std::vector<std::smatch> matches(const std::string& text, const std::regex& patt
 // The constants of bindings.glsl: name -> number.
 std::map<std::string, int> bindings() {
   static const std::regex pattern(R"(const int (k_\w+) = (\d+);)");
-  static const std::string text = text_of(fs::path(LIMN_SOURCE_DIR) / "projector/shaders/bindings.glsl");
+  static const std::string text = text_of(fs::path(LIMN_SOURCE_DIR) / "shaders/bindings.glsl");
   std::map<std::string, int> found;
   for (const std::smatch& match : matches(text, pattern)) found[match[1]] = std::stoi(match[2]);
   return found;

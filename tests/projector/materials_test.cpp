@@ -32,8 +32,8 @@ Vector3d specular(const Vector3d& f0,
   return nl * a2 / (peak * peak) * 0.5 / visible * fresnel;
 }
 
-// A second implementation of projector/shaders/shading.glsl that sums the soft light over directions. Its
-// horizon is smooth over heights from -0.3 to 0.3; there is one lamp.
+// A second implementation of shaders/shading.glsl that sums the soft light over directions. Its horizon is
+// smooth over heights from -0.3 to 0.3; there is one lamp.
 Vector3d shaded(const Vector3d& base,
                 double metallic,
                 double roughness,

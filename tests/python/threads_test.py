@@ -208,7 +208,10 @@ def detect():
         detector.detect(image)
 def solve():
     while True:
-        limn.solve({str(INPUTS / "photographs")!r}, {folder.name + "/rig"!r}, cameras_only=True, board={BOARD!r})
+        limn.solve({str(INPUTS / "photographs")!r}, {folder.name + "/rig"!r}, cameras_only=True, board={BOARD!r},
+                   progress=report)
+def report(progress):  # Python ends the thread in here
+    time.sleep(0.02)
 for work in (detect, detect, solve):
     threading.Thread(target=work, daemon=True).start()
 time.sleep(0.2)

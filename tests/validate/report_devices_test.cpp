@@ -112,7 +112,9 @@ TEST(ReportDevices, PrivateNamesAreReplacedInDevicesAndTexts) {
   devices.named.displays = {{.name = "projector-samantha"}, {.name = "screen"}};
   PrivateWords words;
   words.add("samantha", "(user)");
+  devices.named.cameras.push_back({.name = "192.168.7.20"});  // an address that nobody knows
   rename_private(&devices, &words);
+  EXPECT_EQ(devices.named.cameras.back().name.find("192"), std::string::npos);
   EXPECT_EQ(devices.named.cameras[0].name, "camera0");
   EXPECT_EQ(devices.named.cameras[1].name, "camera1");
   EXPECT_EQ(devices.named.displays[0].name, "projector0");

@@ -139,13 +139,14 @@ TEST(CleanFolder, KeepsKeysAndNumbersOfJsonFiles) {
   words.add("green", "(user)");
   words.add("12345678", "(serial)");
   ASSERT_TRUE(write_file(folder / "a.json", R"({"green": 12345678, "who": "green 12345678"})"));
-  ASSERT_TRUE(write_file(folder / "b.jsonl", "{\"green\":12345678}\n{\"who\":\"Green\"}\n"));
+  ASSERT_TRUE(write_file(folder / "b.jsonl", "{\"green\":12345678}\n{\"who\":\"Green\"}\n{\"mm\":1.50}\n"));
   ASSERT_TRUE(write_file(folder / "same.json", "{ \"green\":12345678 }"));
   ASSERT_TRUE(write_file(folder / "damaged.JPG", "\xFF\xD8 by green"));
   ASSERT_TRUE(clean_folder(folder, words));
   EXPECT_EQ(nlohmann::json::parse(read_file(folder / "a.json").value()),
             nlohmann::json({{"green", 12345678}, {"who", "(user) (serial)"}}));
-  EXPECT_EQ(read_file(folder / "b.jsonl").value(), "{\"green\":12345678}\n{\"who\":\"(user)\"}\n");
+  EXPECT_EQ(read_file(folder / "b.jsonl").value(),
+            "{\"green\":12345678}\n{\"who\":\"(user)\"}\n{\"mm\":1.50}\n");
   EXPECT_EQ(read_file(folder / "same.json").value(), "{ \"green\":12345678 }");
   EXPECT_FALSE(fs::exists(folder / "damaged.JPG"));
 }
@@ -162,6 +163,17 @@ TEST(ImageMetadata, AJpegLosesCommentsAndExifAndKeepsItsPixels) {
   EXPECT_EQ(without_metadata(start + jfif + exif + comment + adobe + table + pixels + "samantha").value(),
             start + jfif + adobe + table + pixels);
   EXPECT_EQ(without_metadata(start + jfif + table + pixels).value(), std::nullopt);
+  // Several scans with a comment between them, and another image behind the first (MPO).
+  const std::string scan = segment('\xDA', "scan") + std::string(
+                                                         "a\xFF\x00"
+                                                         "b\xFF\xD0"
+                                                         "c\xFF",
+                                                         7);
+  const std::string end = "\xFF\xD9";
+  EXPECT_EQ(without_metadata(start + scan + comment + scan + end + start + exif + pixels).value(),
+            start + scan + scan + end);
+  EXPECT_EQ(without_metadata(start + scan + scan + end).value(), std::nullopt);
+  EXPECT_FALSE(without_metadata(start + scan + "samantha"));  // without an end
   EXPECT_FALSE(without_metadata("no image"));
   EXPECT_FALSE(without_metadata(start + exif.substr(0, 8)));  // truncated
 }

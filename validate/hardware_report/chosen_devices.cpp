@@ -105,7 +105,7 @@ Result<ChosenDevices> choose_devices(const ReportOptions& options,
 
 void rename_private(ChosenDevices* devices, PrivateWords* words) {
   const auto rename = [&](std::string* name, const std::string& kind) {
-    if (!words->is_in(*name)) return;
+    if (words->without(*name) == *name) return;  // also an address that nobody knows
     const auto is_taken = [&](const std::string& other) {
       return std::ranges::any_of(devices->named.cameras,
                                  [&](const auto& one) { return one.name == other; }) ||

@@ -3,7 +3,8 @@
 The same functions as Limn's library for C++, with numpy arrays; results are equal to the bit. Poses are a_from_b:
 p_a = a_from_b * p_b. Metres, radians, seconds; another unit is in the name. Pixel (0, 0) is the centre of the
 top-left pixel; cameras and projectors: x right, y down, z forward. Images are arrays of uint8, (height, width) or
-(height, width, 3). What can be corrected is a limn.Error, whose message is that of the program.
+(height, width, 3). What can be corrected is a limn.Error, whose message is that of the program. After os.fork() in the
+middle of a call of another thread, the child must not use limn.
 
 `python3 -m limn` is the program.
 """

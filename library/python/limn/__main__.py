@@ -9,8 +9,9 @@ import sys
 def find_program():
     """The program's path; None if there is none."""
     package = pathlib.Path(__file__).resolve().parent
-    build, prefix = package.parents[1], package.parents[3:4]  # BUILD/python/limn, PREFIX/lib/python3/dist-packages/limn
-    for program in (build / "limn", *(folder / "bin" / "limn" for folder in prefix)):
+    build = package.parent.parent  # of BUILD/python/limn
+    prefix = build.parent.parent  # of PREFIX/lib/python3/dist-packages/limn
+    for program in (build / "limn", prefix / "bin" / "limn"):
         if program.is_file() and os.access(program, os.X_OK):
             return program
     return shutil.which("limn")

@@ -1,4 +1,4 @@
-#include "design/design_advice.h"
+#include "wizard/design/design_advice.h"
 
 #include <fmt/format.h>
 
@@ -7,8 +7,8 @@
 #include <cstddef>
 
 #include "calib/judge/assess.h"
-#include "design/sight_lines.h"
-#include "design/volume_points.h"
+#include "wizard/design/sight_lines.h"
+#include "wizard/design/volume_points.h"
 
 namespace limn::design {
 namespace {

@@ -1,4 +1,4 @@
-#include "design/design_report.h"
+#include "wizard/design/design_report.h"
 
 #include <fmt/format.h>
 

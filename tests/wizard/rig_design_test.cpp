@@ -1,4 +1,4 @@
-#include "design/rig_design.h"
+#include "wizard/design/rig_design.h"
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 
 #include "apps/plan_rig.h"
 #include "core/file.h"
-#include "design/design_report.h"
 #include "tests/support/matchers.h"
+#include "wizard/design/design_report.h"
 
 namespace limn::design {
 namespace {

@@ -4,7 +4,7 @@
 layout(std430, binding = k_deferred_list_buffer) buffer DeferredList {
   uint s_deferred_count;
   uint s_deferred_groups[3];
-  uint s_deferred[];  // same format as projector/shaders/work_list.glsl, which reads it
+  uint s_deferred[];  // same format as shaders/work_list.glsl, which reads it
 };
 
 void defer_pixel(ivec2 at) {

@@ -1,6 +1,6 @@
 #version 450 core
 // Finds a depth edge in each of the listed blocks, and lists the blocks that have one for
-// projector/shaders/depth_edge_handover.comp.
+// shaders/depth_edge_handover.comp.
 #include "bindings.glsl"
 #include "depth_edges.glsl"
 #include "work_list.glsl"

@@ -1,9 +1,9 @@
-#include "design/rig_description.h"
+#include "wizard/design/rig_description.h"
 
 #include <cmath>
 
 #include "core/config.h"
-#include "design/sight_lines.h"
+#include "wizard/design/sight_lines.h"
 
 namespace limn::design {
 namespace {

@@ -1,4 +1,4 @@
-#include "design/simulated_observations.h"
+#include "wizard/design/simulated_observations.h"
 
 #include <cmath>
 #include <cstddef>
@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "calib/measurement_model.h"
-#include "design/sight_lines.h"
+#include "wizard/design/sight_lines.h"
 
 namespace limn::design {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "design/rig_description.h"
+#include "wizard/design/rig_description.h"
 
 namespace limn::design {
 

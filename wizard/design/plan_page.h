@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "design/rig_design.h"
+#include "wizard/design/rig_design.h"
 
 namespace limn::design {
 

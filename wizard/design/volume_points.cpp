@@ -1,4 +1,4 @@
-#include "design/volume_points.h"
+#include "wizard/design/volume_points.h"
 
 namespace limn::design {
 namespace {

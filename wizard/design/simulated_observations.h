@@ -1,7 +1,7 @@
 #pragma once
 
 #include "calib/observations.h"
-#include "design/rig_description.h"
+#include "wizard/design/rig_description.h"
 
 namespace limn::design {
 

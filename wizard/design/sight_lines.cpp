@@ -1,4 +1,4 @@
-#include "design/sight_lines.h"
+#include "wizard/design/sight_lines.h"
 
 #include <Eigen/Geometry>
 #include <cmath>

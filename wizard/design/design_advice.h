@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "design/rig_design.h"
+#include "wizard/design/rig_design.h"
 
 namespace limn::design {
 

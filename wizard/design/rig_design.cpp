@@ -1,4 +1,4 @@
-#include "design/rig_design.h"
+#include "wizard/design/rig_design.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -11,11 +11,11 @@
 #include "calib/judge/assess.h"
 #include "calib/judge/uncertainty.h"
 #include "calib/solve.h"
-#include "design/design_advice.h"
-#include "design/sight_lines.h"
-#include "design/simulated_observations.h"
-#include "design/volume_points.h"
 #include "tracker/pose_fit.h"
+#include "wizard/design/design_advice.h"
+#include "wizard/design/sight_lines.h"
+#include "wizard/design/simulated_observations.h"
+#include "wizard/design/volume_points.h"
 
 namespace limn::design {
 namespace {

@@ -10,13 +10,13 @@
 #include "apps/calibrate.h"
 #include "calib/solve.h"
 #include "core/file.h"
-#include "design/rig_design.h"
 #include "sim/world.h"
 #include "tests/calib/true_rig.h"
 #include "tests/support/matchers.h"
 #include "tests/wizard/small_plan.h"
 #include "tracker/marker_image.h"
 #include "wizard/capture/capture_plan.h"
+#include "wizard/design/rig_design.h"
 
 namespace limn::design {
 namespace {

@@ -9,7 +9,7 @@
 #include "work_list.glsl"
 layout(local_size_x = 64) in;
 layout(r8, binding = k_edge_marks_image) uniform writeonly image2D u_marks;
-// Output of projector/shaders/depth_edges.comp for each projector.
+// Output of shaders/depth_edges.comp for each projector.
 layout(binding = k_depth_edges_unit) uniform sampler2DArray s_depth_edges;
 uniform int u_projector;
 

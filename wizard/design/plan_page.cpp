@@ -1,4 +1,4 @@
-#include "design/plan_page.h"
+#include "wizard/design/plan_page.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include "calib/judge/assess.h"
 #include "core/html.h"
 #include "core/svg.h"
-#include "design/design_report.h"
+#include "wizard/design/design_report.h"
 
 namespace limn::design {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "design/rig_description.h"
+#include "wizard/design/rig_description.h"
 
 namespace limn::design {
 
