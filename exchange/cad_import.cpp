@@ -12,6 +12,9 @@ namespace {
 
 using nlohmann::ordered_json;
 
+// A step that shows no progress may take this share of the time.
+constexpr double k_silent_share = 0.2;
+
 std::string sentence_of(const ordered_json& solid) {
   double size_mm[3];
   for (std::size_t i = 0; i < 3; ++i)
@@ -24,7 +27,7 @@ std::string sentence_of(const ordered_json& solid) {
 
 void print_report(const ordered_json& report) {
   print_out("{}{}{}, unit {}: {} solids of {} shapes, {} triangles, chord error {:.3f} mm\n",
-            report["format"].get<std::string>(), report["application_protocol"].empty() ? "" : " ",
+            report["format"].get<std::string>(), report["application_protocol"] == "" ? "" : " ",
             report["application_protocol"].get<std::string>(),
             report["unit"].get<std::string>().empty() ? "not stated" : report["unit"].get<std::string>(),
             report["solids"].size(), report["meshes"].get<std::size_t>(),
@@ -41,7 +44,9 @@ Status import_cad(const CadImportOptions& options) {
     return usage_error("--out: expected {} with --as {}, found '{}'.",
                        is_glb ? "a folder" : "a file NAME.glb", k_cad_taken_as.text(options.as),
                        options.out.string());
-  const scene::CadLimits limits{.seconds = 60 * options.minutes, .memory_mb = 1024 * options.memory_gb};
+  const double seconds = 60 * options.minutes;
+  const scene::CadLimits limits{
+      .seconds = seconds, .silent_seconds = k_silent_share * seconds, .memory_mb = 1024 * options.memory_gb};
   LIMN_TRY(const std::string text,
            scene::run_limn_cad(
                options.file,

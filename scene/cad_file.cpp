@@ -122,7 +122,7 @@ Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const
   const std::vector<std::string> arguments = {"--out",       glb.string(),
                                               "--chord-mm",  fmt::format("{}", options.chord_mm),
                                               "--angle-deg", fmt::format("{}", options.angle_deg)};
-  const auto report = run_limn_cad(file, arguments, options.limits, stop);
+  const auto [report, fails_again] = try_limn_cad(file, arguments, options.limits, stop);
   std::error_code none;
   if (report) {
     fs::remove(failed, none);
@@ -130,7 +130,7 @@ Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const
     return error("{}: expected that it stays as it is while limn-cad reads it, found it changed. Try again.",
                  file.string());
   }
-  if (!stop.stop_requested())  // what cannot be written is only read once more
+  if (fails_again)  // what cannot be written is only read once more
     static_cast<void>(
         write_file(failed, json_text(json{{"attempt", attempt}, {"message", report.message()}})));
   return report.error();

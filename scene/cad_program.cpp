@@ -29,8 +29,8 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 constexpr const char *k_program = "limn-cad", *k_variable = "LIMN_CAD";
-constexpr int k_exit_no_memory = 3;  // limn-cad's exit code
-constexpr int k_priority = 10;       // a session's frames come first
+constexpr int k_exit_wrong_file = 1, k_exit_no_memory = 3;  // limn-cad's exit codes
+constexpr int k_priority = 10;                              // a session's frames come first
 constexpr std::size_t k_most_report = 256U << 20, k_most_messages = 16U << 10;  // bytes
 
 Error not_installed(const fs::path& file, const std::string& found) {
@@ -155,40 +155,52 @@ std::string last_message(const std::string& messages) {
   return last.starts_with(name) ? last.substr(name.size()) : last;
 }
 
-constexpr const char* k_larger =
-    "Allow a larger chord error and write it as a mesh once: limn import cad FILE --chord-mm 0.5 --out "
-    "FILE.glb";
+// What to do about a file that exceeds a limit, which `option` of `limn import cad` raises.
+std::string remedy(const char* option) {
+  return fmt::format(
+      "Allow more and write it as a mesh once (limn import cad FILE {} --out FILE.glb), or a larger chord "
+      "error (--chord-mm 0.5).",
+      option);
+}
 
 Error exceeded_time(const fs::path& file, const CadLimits& limits, bool was_silent) {
   return error(
-      "{}: expected a CAD file that is read within {:.0f} s{}, found one on which limn-cad does not end. {}",
+      "{}: expected a CAD file that is read within {:.3g} s{}, found one on which limn-cad does not end. {}",
       file.string(), was_silent ? limits.silent_seconds : limits.seconds, was_silent ? " at each step" : "",
-      k_larger);
+      remedy("--minutes 60"));
 }
 
 Error exceeded_memory(const fs::path& file, const CadLimits& limits) {
   return error(
       "{}: expected a CAD file that can be read in {:.0f} MB of memory, found one that needs more. {}",
-      file.string(), limits.memory_mb, k_larger);
+      file.string(), limits.memory_mb, remedy("--memory-gb 8"));
 }
 
-Result<std::string> report_of(const fs::path& file,
-                              int status,
-                              const std::string& output,
-                              const std::string& messages,
-                              const CadLimits& limits) {
+bool is_crash(int signal) {
+  return signal == SIGSEGV || signal == SIGABRT || signal == SIGBUS || signal == SIGFPE || signal == SIGILL;
+}
+
+CadRun ended(const fs::path& file,
+             int status,
+             const std::string& output,
+             const std::string& messages,
+             const CadLimits& limits) {
+  if (WIFSIGNALED(status) && is_crash(WTERMSIG(status)))
+    return {error("{}: expected a whole CAD file, found one on which limn-cad crashes ({}). Export it again.",
+                  file.string(), strsignal(WTERMSIG(status))),
+            true};
   if (WIFSIGNALED(status))
-    return error("{}: expected a whole CAD file, found one on which limn-cad crashes ({}). Export it again.",
-                 file.string(), strsignal(WTERMSIG(status)));
-  if (WEXITSTATUS(status) == k_exit_no_memory) return exceeded_memory(file, limits);
+    return {
+        error("{}: expected that limn-cad reads it to its end, found it ended from outside ({}). Try again.",
+              file.string(), strsignal(WTERMSIG(status)))};
+  const int code = WEXITSTATUS(status);
+  if (code == 0) return {output};
+  if (code == k_exit_no_memory) return {exceeded_memory(file, limits), true};
   const std::string message = last_message(messages);
-  if (WEXITSTATUS(status) != 0)
-    return error("{}",
-                 message.empty()
-                     ? fmt::format("{}: expected that limn-cad reads it, found exit code {} and no message.",
-                                   file.string(), WEXITSTATUS(status))
-                     : message);
-  return output;
+  if (message.empty())
+    return {error("{}: expected that limn-cad reads it, found exit code {} and no message.", file.string(),
+                  code)};
+  return {Error{message}, code == k_exit_wrong_file};
 }
 
 }  // namespace
@@ -207,18 +219,20 @@ Result<fs::path> limn_cad_for(const fs::path& file) {
   return not_installed(file, "none beside limn or on PATH");
 }
 
-Result<std::string> run_limn_cad(const fs::path& file,
-                                 const std::vector<std::string>& arguments,
-                                 const CadLimits& limits,
-                                 const std::stop_token& stop) {
-  LIMN_TRY(const fs::path program, limn_cad_for(file));
+CadRun try_limn_cad(const fs::path& file,
+                    const std::vector<std::string>& arguments,
+                    const CadLimits& limits,
+                    const std::stop_token& stop) {
+  const auto found = limn_cad_for(file);
+  if (!found) return {found.error()};
+  const fs::path& program = *found;
   std::vector<std::string> words = {program.string(), file.string(), "--json",
                                     "--progress",     "--memory-mb", fmt::format("{}", limits.memory_mb)};
   words.insert(words.end(), arguments.begin(), arguments.end());
   CadProcess child;
   if (const auto failed = child.start(program, words, limits))
-    return not_installed(
-        file, fmt::format("'{}', which does not start: {}", program.string(), std::strerror(*failed)));
+    return {error("{}: expected that the program {} starts, found '{}': {}. Try again, or install it again.",
+                  file.string(), k_program, program.string(), std::strerror(*failed))};
   ProgressOutput shown(file);
   std::string output, messages;
   const auto begun = Clock::now();
@@ -236,12 +250,20 @@ Result<std::string> run_limn_cad(const fs::path& file,
     if (shown.take_progress(&output)) moved = Clock::now();
     if (messages.size() > k_most_messages) messages.erase(0, messages.size() - k_most_messages);
     const bool was_silent = seconds_since(moved) > limits.silent_seconds;
-    if (was_silent || seconds_since(begun) > limits.seconds) return exceeded_time(file, limits, was_silent);
-    if (output.size() > k_most_report) return exceeded_memory(file, limits);
+    if (was_silent || seconds_since(begun) > limits.seconds)
+      return {exceeded_time(file, limits, was_silent), true};
+    if (output.size() > k_most_report) return {exceeded_memory(file, limits), true};
     if (stop.stop_requested())
-      return error("{}: expected time to read it, found the session's end.", file.string());
+      return {error("{}: expected time to read it, found the session's end.", file.string())};
   }
-  return report_of(file, child.wait_for_end(), output, messages, limits);
+  return ended(file, child.wait_for_end(), output, messages, limits);
+}
+
+Result<std::string> run_limn_cad(const fs::path& file,
+                                 const std::vector<std::string>& arguments,
+                                 const CadLimits& limits,
+                                 const std::stop_token& stop) {
+  return try_limn_cad(file, arguments, limits, stop).report;
 }
 
 }  // namespace limn::scene

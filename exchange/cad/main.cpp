@@ -29,7 +29,7 @@ namespace {
 
 constexpr const char* k_help =
     "Usage: limn-cad FILE --out OUT [--as part|parts|variants] [--chord-mm 0.1] [--angle-deg 20] [--json]\n"
-    "                [--progress] [--memory-mb N]\n\n"
+    "                [--most-triangles N] [--progress] [--memory-mb N]\n\n"
     "Reads a STEP or IGES file and writes its surfaces as triangles (GLB, in metres). `limn` starts this\n"
     "program by itself wherever it reads such a file; `limn import cad --help` says more.\n\n"
     "  --out OUT          File to write, such as door.glb; for parts and variants a folder\n"
@@ -37,11 +37,13 @@ constexpr const char* k_help =
     "solid\n"
     "  --chord-mm MM      Largest distance between surfaces and triangles\n"
     "  --angle-deg DEG    Largest angle between the normals at the ends of a triangle's side\n"
+    "  --most-triangles N Refuse a file of more (10000000)\n"
     "  --json             Print the report limn.cad/1 instead of lines\n"
     "  --progress         Print lines \"progress PERCENT WHAT\" first\n"
     "  --memory-mb N      Take at most so much memory\n";
 
-constexpr int k_no_memory = 3;  // exit code; 1: a message says what is wrong; 2: a wrong command line
+// Exit codes (scene/cad_program.cpp): 1: a message says what is wrong with the file.
+constexpr int k_wrong_file = 1, k_wrong_usage = 2, k_no_memory = 3, k_not_written = 4;
 
 struct Options {
   std::filesystem::path file, out;
@@ -70,6 +72,12 @@ Status read_value(const std::string& option, const std::string& value, Options* 
   }
   if (option == "--chord-mm") return read_number(option, value, 1e-4, 1000, &options->how.chord_mm);
   if (option == "--angle-deg") return read_number(option, value, 1, 90, &options->how.angle_deg);
+  if (option == "--most-triangles") {
+    double most = 0;
+    LIMN_TRY_STATUS(read_number(option, value, 1, 1e8, &most));
+    options->how.most_triangles = static_cast<std::size_t>(most);
+    return {};
+  }
   if (option == "--memory-mb") return read_number(option, value, 16, 1e6, &options->memory_mb);
   return usage_error("expected an option of limn-cad (limn-cad --help), found '{}'.", option);
 }
@@ -108,11 +116,12 @@ bool is_near_limit(double memory_mb) {
 }
 
 std::string sentences_of(const nlohmann::ordered_json& report) {
-  std::string text = fmt::format(
-      "{} {}, unit {}: {} solids ({} meshes), {} triangles, chord error {:.3g} mm\n",
-      report["format"].get<std::string>(), report["application_protocol"].get<std::string>(),
-      report["unit"].get<std::string>(), report["solids"].size(), report["meshes"].get<std::size_t>(),
-      report["triangles"].get<std::size_t>(), report["chord_error_mm"].get<double>());
+  std::string text =
+      fmt::format("{}{}{}, unit {}: {} solids ({} meshes), {} triangles, chord error {:.3g} mm\n",
+                  report["format"].get<std::string>(), report["application_protocol"] == "" ? "" : " ",
+                  report["application_protocol"].get<std::string>(), report["unit"].get<std::string>(),
+                  report["solids"].size(), report["meshes"].get<std::size_t>(),
+                  report["triangles"].get<std::size_t>(), report["chord_error_mm"].get<double>());
   for (const auto& file : report["files"]) text += file["file"].get<std::string>() + "\n";
   return text;
 }
@@ -133,19 +142,32 @@ bool write_all(int descriptor, std::string_view text) {
   return true;
 }
 
-Status run(const Options& options, int results) {
+// What is wrong, and the exit code for it; nullopt: all is written.
+struct Problem {
+  std::string message;
+  int code;
+};
+
+std::optional<Problem> run(const Options& options, int results) {
   Message::DefaultMessenger()->ChangePrinters().Clear();
   XCAFDoc_ShapeTool::SetAutoNaming(Standard_False);
   const Handle(ProgressLines) progress = new ProgressLines(options.progress ? results : -1);
-  LIMN_TRY(const CadModel model, read_cad_model(options.file, options.how, progress.get()));
+  const auto model = read_cad_model(options.file, options.how, progress.get());
+  if (!model) return Problem{model.message(), k_wrong_file};
   progress->begin_stage("writing", 95, 100);
-  LIMN_TRY(const auto written, write_parts(model, options.as, options.how, options.out));
-  const nlohmann::ordered_json report = cad_report(model, options.how, written);
-  for (const std::string& warning : model.warnings)
+  const auto written = write_parts(*model, options.as, options.how, options.out);
+  if (!written) return Problem{written.message(), k_not_written};
+  const nlohmann::ordered_json report = cad_report(*model, options.how, *written);
+  for (const std::string& warning : model->warnings)
     if (!options.json) std::cerr << "limn-cad: warning: " << warning << '\n';
   if (!write_all(results, options.json ? json_text(report) + "\n" : sentences_of(report)))
-    return error("standard output: expected to write the results, found it closed or full.");
-  return {};
+    return Problem{"standard output: expected to write the results, found it closed or full.", k_not_written};
+  return std::nullopt;
+}
+
+std::string unreadable(const Options& options, const char* found) {
+  return fmt::format("{}: expected a whole CAD file, found one that cannot be read ({}). Export it again.",
+                     options.file.string(), found);
 }
 
 int run_limited(const Options& options) {
@@ -157,27 +179,23 @@ int run_limited(const Options& options) {
     setrlimit(RLIMIT_AS, &limits);
   }
   const int results = results_apart();
-  std::string problem;
+  Problem problem{"", k_wrong_file};
   try {
-    const Status status = run(options, results);
-    if (status) return 0;
-    problem = status.message();
+    auto found = run(options, results);
+    if (!found) return 0;
+    problem = std::move(*found);
   } catch (const Standard_OutOfMemory&) {
     return k_no_memory;
   } catch (const std::bad_alloc&) {
     return k_no_memory;
   } catch (const Standard_Failure& failure) {
-    problem =
-        fmt::format("{}: expected a whole CAD file, found one that cannot be read ({}). Export it again.",
-                    options.file.string(), failure.DynamicType()->Name());
+    problem.message = unreadable(options, failure.DynamicType()->Name());
   } catch (const std::exception& failure) {
-    problem =
-        fmt::format("{}: expected a whole CAD file, found one that cannot be read ({}). Export it again.",
-                    options.file.string(), failure.what());
+    problem.message = unreadable(options, failure.what());
   }
-  if (is_near_limit(options.memory_mb)) return k_no_memory;
-  std::cerr << "limn-cad: " << problem << '\n';
-  return 1;
+  if (problem.code == k_wrong_file && is_near_limit(options.memory_mb)) return k_no_memory;
+  std::cerr << "limn-cad: " << problem.message << '\n';
+  return problem.code;
 }
 
 }  // namespace
@@ -187,7 +205,7 @@ int main(int argc, char** argv) {
   const auto options = limn::cad::read_options({argv + 1, argv + argc});
   if (!options) {
     std::cerr << "limn-cad: " << options.message() << '\n';
-    return 2;
+    return limn::cad::k_wrong_usage;
   }
   if (options->help) {
     std::cout << limn::cad::k_help;

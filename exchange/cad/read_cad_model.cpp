@@ -177,14 +177,52 @@ std::vector<Body> bodies_of(const Leaf& leaf, const SolidNames& names) {
   return bodies;
 }
 
-bool has_solids(const Leaf& leaf) {
-  return TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
+using ShapeColours = NCollection_DataMap<TopoDS_Shape, Colour, TopTools_ShapeMapHasher>;
+
+// Faces that are joined along their edges, with their colours.
+struct Joined {
+  TopoDS_Shape shape;
+  ShapeColours colours;
+  Colour operator()(const TopoDS_Face& face) const {
+    const Colour* own = colours.Seek(face);
+    return own ? *own : colour_of(XCAFPrs_Style());
+  }
+};
+
+Joined joined(const std::vector<std::pair<TopoDS_Shape, Colour>>& faces, double tolerance_mm) {
+  BRepBuilderAPI_Sewing sewing(tolerance_mm);
+  for (const auto& [face, colour] : faces) sewing.Add(face);
+  sewing.Perform();
+  Joined out{sewing.SewedShape(), {}};
+  for (const auto& [face, colour] : faces) {
+    const TopoDS_Shape now = sewing.IsModifiedSubShape(face) ? sewing.ModifiedSubShape(face) : face;
+    if (!out.colours.IsBound(now)) out.colours.Bind(now, colour);
+  }
+  return out;
+}
+
+// The faces of a product at a place, with their colours.
+void add_faces(const Leaf& leaf, const gp_Trsf& placed, std::vector<std::pair<TopoDS_Shape, Colour>>* faces) {
+  const FaceColours colours(leaf);
+  TopExp_Explorer at(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_FACE);
+  for (; at.More(); at.Next())
+    faces->emplace_back(at.Current().Moved(TopLoc_Location(placed)), colours(TopoDS::Face(at.Current())));
+}
+
+// Whether a shape of an IGES file is a thing by itself: it has solids, or is a named group of surfaces.
+bool is_whole(const Leaf& leaf) {
+  const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(leaf.product);
+  if (TopExp_Explorer(shape, TopAbs_SOLID).More()) return true;
+  TopExp_Explorer face(shape, TopAbs_FACE);
+  if (leaf.name.empty() || !face.More()) return false;
+  face.Next();
+  return face.More();
 }
 
 // A chord error of one digit with which a model of so many triangles at `chord_mm` has few enough. Their
 // number falls at least with the square root of the chord error.
-double sufficient_chord_mm(double chord_mm, double triangles) {
-  const double needed = chord_mm * std::pow(triangles / static_cast<double>(k_most_triangles), 2);
+double sufficient_chord_mm(const Tessellation& how, double triangles) {
+  const double needed = how.chord_mm * std::pow(triangles / static_cast<double>(how.most_triangles), 2);
   const double decade = std::pow(10, std::floor(std::log10(needed)));
   for (const double digit : {1.0, 2.0, 5.0})
     if (digit * decade >= needed) return digit * decade;
@@ -219,42 +257,24 @@ class Builder {
 
   // Error: there are too many triangles, when this share of the places is done.
   Status check_count(double share) const {
-    if (triangles_ <= k_most_triangles) return {};
+    if (triangles_ <= how_.most_triangles) return {};
     const double expected = static_cast<double>(triangles_) / std::max(share, 1e-3);
     return error(
-        "{}: expected at most {} million triangles, found about {:.0f} million with a chord error of {} mm. "
+        "{}: expected at most {:g} million triangles, found about {:.2g} million with a chord error of {} "
+        "mm. "
         "Allow a larger one: limn import cad FILE --chord-mm {}",
-        path_.string(), k_most_triangles / 1'000'000, std::ceil(1e-6 * expected), how_.chord_mm,
-        sufficient_chord_mm(how_.chord_mm, expected));
+        path_.string(), 1e-6 * static_cast<double>(how_.most_triangles), 1e-6 * expected, how_.chord_mm,
+        sufficient_chord_mm(how_, expected));
   }
 
-  // Surfaces that belong to no solid, as IGES files have them: joined along their edges into one mesh.
+  // Surfaces of no solid and no named group, as IGES files have them: joined along their edges into one mesh.
   void add_loose(const std::vector<Leaf>& leaves) {
     if (leaves.empty()) return;
-    BRepBuilderAPI_Sewing sewing(how_.chord_mm / 2);
     std::vector<std::pair<TopoDS_Shape, Colour>> faces;
-    for (const Leaf& leaf : leaves) {
-      const FaceColours colours(leaf);
-      TopExp_Explorer at(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_FACE);
-      for (; at.More(); at.Next()) {
-        const TopoDS_Shape placed = at.Current().Moved(TopLoc_Location(leaf.placed));
-        faces.emplace_back(placed, colours(TopoDS::Face(at.Current())));
-        sewing.Add(placed);
-      }
-    }
-    sewing.Perform();
-    NCollection_DataMap<TopoDS_Shape, Colour, TopTools_ShapeMapHasher> colours;
-    for (const auto& [face, colour] : faces) {
-      const TopoDS_Shape joined = sewing.IsModifiedSubShape(face) ? sewing.ModifiedSubShape(face) : face;
-      if (!colours.IsBound(joined)) colours.Bind(joined, colour);
-    }
-    const auto colour_of_face = [&](const TopoDS_Face& face) {
-      const Colour* own = colours.Seek(face);
-      return own ? *own : colour_of(XCAFPrs_Style());
-    };
+    for (const Leaf& leaf : leaves) add_faces(leaf, leaf.placed, &faces);
+    const Joined whole = joined(faces, how_.chord_mm / 2);
     const std::string name = leaves.size() == 1 ? leaves.front().name : "";
-    if (const auto mesh = cut_body({sewing.SewedShape(), name}, colour_of_face))
-      add_node(name, {}, *mesh, gp_Trsf());
+    if (const auto mesh = cut_body({whole.shape, name}, whole)) add_node(name, {}, *mesh, gp_Trsf());
   }
 
   CadModel model;
@@ -276,11 +296,22 @@ class Builder {
 
   Named cut(const Leaf& leaf) {
     Named named;
+    const bool has_solid = TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
+    if (document_.format == "IGES" && !has_solid) return cut_group(leaf);
     const FaceColours colours(leaf);
     for (const Body& body : bodies_of(leaf, document_.solid_names))
       if (const auto mesh = cut_body(body, [&](const TopoDS_Face& face) { return colours(face); }))
         named.emplace_back(body.name, *mesh);
     return named;
+  }
+
+  // A named group of surfaces, joined along their edges.
+  Named cut_group(const Leaf& leaf) {
+    std::vector<std::pair<TopoDS_Shape, Colour>> faces;
+    add_faces(leaf, gp_Trsf(), &faces);
+    const Joined group = joined(faces, how_.chord_mm / 2);
+    const auto mesh = cut_body({group.shape, leaf.name}, group);
+    return mesh ? Named{{leaf.name, *mesh}} : Named{};
   }
 
   // The index of a body's mesh; nullopt when it has no surfaces.
@@ -317,7 +348,7 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
   Builder builder(path, document, how);
   builder.model.warnings = document.warnings;
   if (document.format == "IGES") {
-    const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), has_solids);
+    const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), is_whole);
     builder.add_loose({loose, leaves.all.end()});
     leaves.all.erase(loose, leaves.all.end());
     LIMN_TRY_STATUS(builder.check_count(1));

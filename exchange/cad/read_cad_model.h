@@ -8,12 +8,9 @@
 
 namespace limn::cad {
 
-/// A model of more triangles is refused, with the chord error that would do.
-inline constexpr std::size_t k_most_triangles = 10'000'000;
-
 /// Reads a STEP or IGES file: a mesh for each solid (or for the surfaces of a product that has no solids),
 /// and a node for each place at which it stands. Surfaces that are hidden in the file are left out. Errors:
-/// as read_document(); no surfaces; too many triangles.
+/// as read_document(); no surfaces; more triangles than `how` allows.
 Result<CadModel> read_cad_model(const std::filesystem::path& path,
                                 const Tessellation& how,
                                 ProgressLines* progress);

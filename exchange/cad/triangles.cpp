@@ -127,17 +127,26 @@ double chord_error_mm(const std::vector<Cut>& cuts) {
 
 // ---- triangles
 
-// The normals of the surface at a face's nodes; zero where it has none, as at the tip of a cone.
+// The normals of the surface at a face's nodes. Where it has none, as at a pole or at the tip of a cone, the
+// normal a little inside the face; zero where there is none either.
 std::vector<Eigen::Vector3f> normals_of(const Cut& cut) {
   BRepAdaptor_Surface surface(cut.face, Standard_False);
   BRepLProp_SLProps at(surface, 1, 1e-12);
   std::vector<Eigen::Vector3f> normals(static_cast<std::size_t>(cut.triangles->NbNodes()),
                                        Eigen::Vector3f::Zero());
   if (!cut.triangles->HasUVNodes()) return normals;
+  constexpr double k_inside = 1e-3;  // a share: 1 is the middle of the face
+  gp_XY middle(0, 0);
+  for (int node = 1; node <= cut.triangles->NbNodes(); ++node)
+    middle += cut.triangles->UVNode(node).XY() / cut.triangles->NbNodes();
   const float side = cut.face.Orientation() == TopAbs_REVERSED ? -1.F : 1.F;
   for (int node = 1; node <= cut.triangles->NbNodes(); ++node) {
-    const gp_Pnt2d uv = cut.triangles->UVNode(node);
+    gp_XY uv = cut.triangles->UVNode(node).XY();
     at.SetParameters(uv.X(), uv.Y());
+    if (!at.IsNormalDefined()) {
+      uv += k_inside * (middle - uv);
+      at.SetParameters(uv.X(), uv.Y());
+    }
     if (at.IsNormalDefined())
       normals[static_cast<std::size_t>(node) - 1] = side * vector_of(at.Normal().XYZ()).cast<float>();
   }

@@ -2,9 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <chrono>
+#include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -12,13 +11,11 @@
 #include <set>
 #include <string>
 
-#include "core/data_folder.h"
-#include "core/file.h"
 #include "exchange/cad_import.h"
-#include "scene/cad_file.h"
 #include "scene/cad_program.h"
 #include "scene/mesh.h"
-#include "scene/scene.h"
+#include "tests/exchange/cad_folder.h"
+#include "tests/exchange/iges_text.h"
 #include "tests/exchange/step_text.h"
 #include "tests/support/matchers.h"
 #include "tests/support/random.h"
@@ -30,65 +27,12 @@ namespace fs = std::filesystem;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 using nlohmann::json;
+using test::box_file;
+using test::box_of;
+using test::Cad;
+using test::IgesText;
 using test::StepText;
 using namespace test::literals;
-
-class Cad : public testing::Test {
- protected:
-  void SetUp() override {
-    unsetenv("LIMN_CAD");
-    if (!fs::exists(private_library("limn-cad")))
-      GTEST_SKIP() << "limn-cad was not built: libocct-data-exchange-dev is not installed";
-  }
-
-  fs::path write(const std::string& name, const std::string& text) const {
-    EXPECT_TRUE(write_file(folder / name, text));
-    return folder / name;
-  }
-
-  // What limn-cad reports of a file.
-  json report(const fs::path& file, std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {"--out", (folder / "out.glb").string()});
-    const auto text = scene::run_limn_cad(file, more);
-    EXPECT_TRUE(text) << text.message();
-    return text ? json::parse(*text) : json();
-  }
-
-  scene::Mesh load(const fs::path& file, std::optional<scene::LengthUnit> units = {}) const {
-    auto mesh = scene::load_mesh(file, units);
-    EXPECT_TRUE(mesh) << mesh.message();
-    return mesh ? std::move(*mesh) : scene::Mesh{};
-  }
-
-  std::string refusal(const fs::path& file) const {
-    const auto mesh = scene::load_mesh(file, {});
-    EXPECT_FALSE(mesh);
-    return mesh ? "" : mesh.message();
-  }
-
-  const fs::path folder = test::test_folder();
-};
-
-std::string box_file(const std::string& unit, const std::string& schema) {
-  StepText step(unit, schema);
-  step.part("T\\X2\\00FC\\X0\\rgriff", {step.box({100, 50, 20})});
-  return step.file();
-}
-
-Eigen::AlignedBox3f box_of(const scene::Mesh& mesh) {
-  Eigen::AlignedBox3f box;
-  for (const Vector3f& p : mesh.positions) box.extend(p);
-  return box;
-}
-
-Vector3f size_of(const scene::Mesh& mesh) { return box_of(mesh).sizes(); }
-
-Eigen::AlignedBox3d box_of(const json& solid) {
-  const auto corner = [&](std::size_t i) {
-    return Vector3d(solid["box_m"][i][0], solid["box_m"][i][1], solid["box_m"][i][2]);
-  };
-  return {corner(0), corner(1)};
-}
 
 TEST_F(Cad, ABoxHasItsSizeInEveryUnitAndSchema) {
   struct Case {
@@ -193,6 +137,74 @@ TEST_F(Cad, TheChordErrorHoldsOnCurvedSurfaces) {
   EXPECT_LE(worst_of(load(folder / "out.glb"), from_ring), 0.01_mm);
 }
 
+// ---- IGES
+
+TEST_F(Cad, AnIgesBoxHasItsSizeAndColourInEveryUnit) {
+  struct Case {
+    int number;
+    const char* name;
+    double metres;
+  };
+  for (const Case& c : {Case{2, "MM", 1e-3}, Case{1, "INCH", 0.0254}, Case{6, "M", 1}, Case{3, "MM", 1e-3}}) {
+    IgesText iges(c.number, c.name);
+    iges.box({1, 2, 3}, {5, 10, 21}, iges.colour({50, 25, 100}));
+    const json found = report(write("box.igs", iges.file()));
+    EXPECT_EQ(found["format"], "IGES");
+    EXPECT_DOUBLE_EQ(found["metres_per_unit"].get<double>(), c.metres) << c.name;
+    ASSERT_EQ(found["solids"].size(), 1u) << c.name;
+    const json& box = found["solids"][0];
+    EXPECT_TRUE(box["closed"].get<bool>()) << "six surfaces become one";
+    EXPECT_EQ(found["triangles"], 12);
+    EXPECT_TRUE(test::near(box_of(box).min(), c.metres * Vector3d(1, 2, 3), 1e-6 * c.metres)) << c.name;
+    EXPECT_TRUE(test::near(box_of(box).max(), c.metres * Vector3d(5, 10, 21), 3e-6 * c.metres)) << c.name;
+    ASSERT_EQ(box["colours"].size(), 1u);
+    const Vector3d colour(box["colours"][0][0], box["colours"][0][1], box["colours"][0][2]);
+    EXPECT_TRUE(test::near(colour, Vector3d(0.21404, 0.05088, 1), 1e-3));
+  }
+}
+
+TEST_F(Cad, RoundIgesSurfacesKeepTheChordError) {
+  IgesText rods, balls;
+  rods.cylinder(10, 30);
+  balls.sphere(20);
+  const scene::Mesh rod = load(write("rod.iges", rods.file())), ball = load(write("ball.igs", balls.file()));
+  ASSERT_FALSE(rod.triangles.empty() || ball.triangles.empty());
+  EXPECT_LE(worst_of(ball, [](const Vector3d& p) { return p.norm() - 0.020; }), 0.1_mm);
+  EXPECT_LE(worst_of(rod,
+                     [](const Vector3d& p) {
+                       const double side = std::hypot(p.x(), p.y()) - 0.010;
+                       return std::min({std::abs(side), std::abs(p.z()), std::abs(p.z() - 0.030)});
+                     }),
+            0.1_mm);
+  EXPECT_TRUE(test::near(box_of(rod).min().cast<double>(), Vector3d(-0.010, -0.010, 0), 0.1_mm));
+  EXPECT_TRUE(test::near(box_of(rod).max().cast<double>(), Vector3d(0.010, 0.010, 0.030), 0.1_mm));
+  for (std::size_t i = 0; i < ball.positions.size(); ++i)
+    EXPECT_GT(ball.normals[i].dot(ball.positions[i].normalized()), 0.9999F) << "outwards";
+}
+
+TEST_F(Cad, IgesSubfiguresAreInstancesWithTheirNames) {
+  IgesText iges(1, "INCH");
+  iges.begin_subfigure();
+  const int bolt = iges.end_subfigure("bolt", iges.box({0, 0, 0}, {1, 2, 3}, 3));  // green
+  iges.place(bolt, {10, 0, 0});
+  iges.place(bolt, {20, 5, 0});
+  iges.box({-5, -5, -5}, {0, 0, 0});
+  const json found = report(write("rest.igs", iges.file()));
+  ASSERT_EQ(found["solids"].size(), 3u) << found;
+  EXPECT_EQ(found["meshes"], 2);
+  std::map<std::string, int> names;
+  for (const json& solid : found["solids"]) ++names[solid["name"]];
+  EXPECT_EQ(names, (std::map<std::string, int>{{"bolt", 2}, {"rest", 1}}));
+  for (const json& solid : found["solids"]) {
+    EXPECT_TRUE(solid["closed"].get<bool>()) << solid;
+    if (solid["name"] != "bolt") continue;
+    EXPECT_EQ(solid["colours"], json({{0.0, 1.0, 0.0, 1.0}}));
+    const Vector3d low = box_of(solid).min().x() < 0.3 ? Vector3d(10, 0, 0) : Vector3d(20, 5, 0);
+    EXPECT_TRUE(test::near(box_of(solid).min(), 0.0254 * low, 1e-6));
+    EXPECT_TRUE(test::near(box_of(solid).max(), 0.0254 * (low + Vector3d(1, 2, 3)), 1e-6));
+  }
+}
+
 TEST_F(Cad, SolidsBecomePartsOrVariants) {
   StepText step;
   const auto bolt = step.part("bolt", {step.box({1, 1, 2})});
@@ -221,52 +233,6 @@ TEST_F(Cad, SolidsBecomePartsOrVariants) {
   options.as = exchange::CadTakenAs::part;
   EXPECT_NE(exchange::import_cad(options).message().find("--out: expected a file NAME.glb"),
             std::string::npos);
-}
-
-// ---- scenes and the cache
-
-TEST_F(Cad, ASlotsFolderTakesAStepFile) {
-  fs::create_directories(folder / "slots" / "mirror");
-  write("a.step", box_file("mm", "AUTOMOTIVE_DESIGN"));
-  write("slots/mirror/b.STEP", box_file("inch", "CONFIG_CONTROL_DESIGN"));
-  write("scene.json",
-        R"({"schema": "limn.scene/1", "prototype": {"mesh": "a.step"}, "slots": [{"name": "mirror",
-    "marker": "aruco_4x4_50:1", "size_mm": 40, "marker_from_part": {"rotation_wxyz": [1,0,0,0], "translation_m": [0,0,0]},
-    "variants": [{"name": "a", "mesh": "a.step"}]}]})");
-  for (const char* reading : {"by limn-cad", "from what it kept"}) {
-    std::vector<scene::SkippedVariant> skipped;
-    const auto scene = scene::load_scene(folder, &skipped);
-    ASSERT_TRUE(scene) << reading << ": " << scene.message();
-    EXPECT_TRUE(skipped.empty()) << reading << ": " << to_text(skipped[0]);
-    ASSERT_EQ(scene->slots[0].variants.size(), 2u) << reading;
-    EXPECT_EQ(scene->slots[0].variants[1].name, "b");
-    EXPECT_EQ(units_question(scene->slots[0], scene->slots[0].variants[1]), "");
-    setenv("LIMN_CAD", "/nowhere", 1);
-  }
-  unsetenv("LIMN_CAD");
-}
-
-TEST_F(Cad, WhatWasKeptIsMadeAgainWhenTheFileChanges) {
-  const fs::path file = write("box.step", box_file("mm", "AUTOMOTIVE_DESIGN"));
-  EXPECT_NEAR(size_of(load(file)).x(), 0.1, 1e-5);
-  const fs::path kept = folder / ".box.step.glb";
-  ASSERT_TRUE(fs::exists(kept));
-  EXPECT_TRUE(scene::is_cad_cache_name(kept));
-  EXPECT_FALSE(scene::is_cad_cache_name("box.step.glb"));
-  const auto first = fs::last_write_time(kept);
-  load(file);
-  EXPECT_EQ(fs::last_write_time(kept), first) << "it was read again without need";
-  write("box.step", box_file("m", "AUTOMOTIVE_DESIGN"));
-  EXPECT_NEAR(size_of(load(file)).x(), 100, 1e-2);
-  const auto other = scene::cad_as_glb(file, {.chord_mm = 0.5});
-  ASSERT_TRUE(other);
-  EXPECT_NE(fs::last_write_time(kept), first);
-}
-
-TEST_F(Cad, AGivenUnitReplacesTheFiles) {
-  const fs::path file = write("box.step", box_file("inch", "AUTOMOTIVE_DESIGN"));
-  EXPECT_NEAR(size_of(load(file)).x(), 2.54, 1e-4);
-  EXPECT_NEAR(size_of(load(file, scene::LengthUnit::millimetre)).x(), 0.1, 1e-5);
 }
 
 // ---- bad input
@@ -308,94 +274,26 @@ TEST_F(Cad, WhatIsNotWholeIsShownWithAWarning) {
 
 TEST_F(Cad, TooManyTrianglesAreRefusedWithAChordErrorThatWouldDo) {
   StepText step;
-  const auto ball = step.part("ball", {step.sphere(250)});
+  const auto ball = step.part("ball", {step.sphere(25)});
   auto whole = ball;
-  for (int level = 0; level < 10; ++level) {  // 1024 balls
+  for (int level = 0; level < 5; ++level) {  // 32 balls
     const auto outer = step.assembly(fmt::format("level {}", level));
     step.place(outer, whole, {0, 0, 0}, "a");
     step.place(outer, whole, {1, 0, 0}, "b");
     whole = outer;
   }
-  const std::string text = refusal(write("balls.step", step.file()));
-  EXPECT_NE(text.find("expected at most 10 million triangles"), std::string::npos) << text;
+  const fs::path file = write("balls.step", step.file());
+  std::vector<std::string> arguments = {"--out", (folder / "out.glb").string(), "--most-triangles", "20000"};
+  const auto refused = scene::run_limn_cad(file, arguments);
+  ASSERT_FALSE(refused) << *refused;
+  const std::string& text = refused.message();
+  EXPECT_NE(text.find("expected at most 0.02 million triangles"), std::string::npos) << text;
   const std::size_t at = text.find("--chord-mm ");
   ASSERT_NE(at, std::string::npos) << text;
-  const json coarse = report(folder / "balls.step", {"--chord-mm", text.substr(at + 11)});
-  EXPECT_GT(coarse["triangles"].get<std::size_t>(), 100000u);
-}
-
-// A program that stands for limn-cad.
-class OtherCad : public Cad {
- protected:
-  void replace(const std::string& script) const {
-    ASSERT_TRUE(write_file(folder / "other-cad", "#!/bin/bash\n" + script + "\n"));
-    fs::permissions(folder / "other-cad", fs::perms::owner_all);
-    setenv("LIMN_CAD", (folder / "other-cad").c_str(), 1);
-  }
-  std::string refusal_of(const scene::CadLimits& limits, const std::stop_token& stop = {}) const {
-    const auto report = scene::run_limn_cad(folder / "a.step", {}, limits, stop);
-    return report ? "" : report.message();
-  }
-  void TearDown() override { unsetenv("LIMN_CAD"); }
-};
-
-TEST_F(OtherCad, WithoutTheProgramAMessageSaysWhatToInstall) {
-  setenv("LIMN_CAD", "/nowhere/limn-cad", 1);
-  const std::string text = refusal(write("box.step", box_file("mm", "AUTOMOTIVE_DESIGN")));
-  EXPECT_NE(text.find("apt install limn-cad"), std::string::npos) << text;
-}
-
-TEST_F(OtherCad, AProgramThatHangsIsEnded) {
-  replace("echo $$ > '" + (folder / "pid").string() + "'; exec sleep 100");
-  const auto begun = std::chrono::steady_clock::now();
-  EXPECT_NE(refusal_of({.seconds = 30, .silent_seconds = 0.5}).find("within 0 s at each step"),
-            std::string::npos)
-      << refusal_of({.seconds = 30, .silent_seconds = 0.5});
-  EXPECT_NE(refusal_of({.seconds = 1, .silent_seconds = 30}).find("within 1 s, found"), std::string::npos);
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(20));
-  const auto pid = read_file(folder / "pid");
-  ASSERT_TRUE(pid);
-  EXPECT_FALSE(fs::exists("/proc/" + std::to_string(std::stoi(*pid)))) << "it still runs";
-}
-
-TEST_F(OtherCad, ProgressKeepsItAlive) {
-  replace("for i in 1 2 3 4; do echo \"progress $i reading\"; sleep 0.3; done; echo '{}'");
-  const auto report = scene::run_limn_cad(folder / "a.step", {}, {.seconds = 30, .silent_seconds = 0.9});
-  ASSERT_TRUE(report) << report.message();
-  EXPECT_EQ(*report, "{}\n");
-}
-
-TEST_F(OtherCad, CrashesMemoryAndMessagesBecomeOneSentence) {
-  replace("kill -SEGV $$");
-  EXPECT_NE(refusal_of({}).find("limn-cad crashes (Segmentation fault)"), std::string::npos);
-  replace("echo noise >&2; printf 'limn-cad: a.step: it is \\001bad.\\n' >&2; exit 1");
-  EXPECT_EQ(refusal_of({}), "a.step: it is bad.");
-  replace("exit 3");
-  EXPECT_NE(refusal_of({}).find("needs more"), std::string::npos);
-  replace("ulimit -v");
-  const auto limit = scene::run_limn_cad(folder / "a.step", {}, {.memory_mb = 512});
-  ASSERT_TRUE(limit);
-  EXPECT_EQ(*limit, "524288\n");
-}
-
-TEST_F(OtherCad, AFileThatFailedIsNotTriedAgainUntilItChanges) {
-  const fs::path count = folder / "count";
-  replace("echo x >> '" + count.string() + "'; echo 'limn-cad: it is bad' >&2; exit 1");
-  const fs::path file = write("bad.step", "one");
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(refusal(file), "it is bad");
-  EXPECT_EQ(read_file(count).value(), "x\n");
-  write("bad.step", "two");
-  EXPECT_EQ(refusal(file), "it is bad");
-  EXPECT_EQ(read_file(count).value(), "x\nx\n");
-}
-
-TEST_F(OtherCad, TheEndOfASessionEndsIt) {
-  replace("exec sleep 100");
-  std::stop_source stop;
-  stop.request_stop();
-  const auto begun = std::chrono::steady_clock::now();
-  EXPECT_NE(refusal_of({}, stop.get_token()).find("the session's end"), std::string::npos);
-  EXPECT_LT(std::chrono::steady_clock::now() - begun, std::chrono::seconds(5));
+  arguments.insert(arguments.end(), {"--chord-mm", text.substr(at + 11)});
+  const auto coarse = scene::run_limn_cad(file, arguments);
+  ASSERT_TRUE(coarse) << coarse.message();
+  EXPECT_GT(json::parse(*coarse)["triangles"].get<std::size_t>(), 1000u);
 }
 
 // Whatever is changed in a file: a report, or one sentence; never a hang. tools/fuzz_cad does it for minutes.
@@ -408,7 +306,7 @@ TEST_F(Cad, MutatedFilesEndInASentence) {
   step.place(whole, step.part("box", {box, step.torus(9, 2)}), {1, 2, 3}, "b");
   const std::string good = step.file();
   auto rng = test::test_rng();
-  for (int run = 0; run < 12; ++run) {
+  for (int run = 0; run < 8; ++run) {
     std::string bad = good;
     for (int change = 0; change < 1 + run % 4; ++change)
       bad[rng() % bad.size()] = "0123456789#(),.$*'E-"[rng() % 20];
