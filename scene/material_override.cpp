@@ -17,8 +17,9 @@ std::optional<Eigen::Vector3d> colour_of(const std::string& word) {
   if (word.size() != 7 || word[0] != '#') return std::nullopt;
   const auto [at, failed] = std::from_chars(word.data() + 1, end, rgb, 16);
   if (failed != std::errc() || at != end) return std::nullopt;
-  return Eigen::Vector3d(linear_from_srgb((rgb >> 16) / 255.0), linear_from_srgb((rgb >> 8 & 255) / 255.0),
-                         linear_from_srgb((rgb & 255) / 255.0));
+  return Eigen::Vector3d(limn::linear_from_srgb((rgb >> 16) / 255.0),
+                         limn::linear_from_srgb((rgb >> 8 & 255) / 255.0),
+                         limn::linear_from_srgb((rgb & 255) / 255.0));
 }
 
 std::optional<double> share_of(const std::string& word) {

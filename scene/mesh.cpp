@@ -2,9 +2,11 @@
 
 #include <mutex>
 
+#include "scene/cad_file.h"
 #include "scene/mesh_content.h"
 #include "scene/mesh_from_content.h"
 #include "scene/mesh_trial.h"
+#include "scene/scene_loading.h"
 
 namespace limn::scene {
 namespace {
@@ -38,9 +40,18 @@ double metres_per_unit(LengthUnit units) {
 }
 
 Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
+  return load_mesh(path, units, std::stop_token());
+}
+
+Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units, const std::stop_token& stop) {
   if (!is_mesh_name(path)) return read_mesh_content(path).error();
   if (std::error_code code; !fs::is_regular_file(path, code)) {
     return error("{}: expected a mesh file, found no file. Check the name.", path.string());
+  }
+  if (is_cad_name(path)) {
+    LIMN_TRY(const CadGlb glb, cad_as_glb(path, {}, stop));
+    LIMN_TRY(MeshContent triangles, read_safely(glb.path));
+    return mesh_from_content(with_cad_unit(std::move(triangles), glb), path, units);
   }
   LIMN_TRY(const MeshContent content, read_safely(path));
   return mesh_from_content(content, path, units);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "scene/cad_file.h"
 #include "scene/read_3mf.h"
 #include "scene/read_gltf.h"
 #include "scene/read_obj.h"
@@ -28,7 +29,8 @@ constexpr MeshFormat k_mesh_formats[] = {
     {".stl", read_stl, false},         {".ply", read_ply, false},         {".3mf", read_3mf, true},
     {".fbx", read_with_assimp, true},  {".dae", read_with_assimp, true},  {".amf", read_with_assimp, true},
     {".3ds", read_with_assimp, false}, {".off", read_with_assimp, false}, {".lwo", read_with_assimp, false},
-    {".x", read_with_assimp, false},   {".ac", read_with_assimp, false}};
+    {".x", read_with_assimp, false},   {".ac", read_with_assimp, false},  {".step", read_cad, true},
+    {".stp", read_cad, true},          {".iges", read_cad, true},         {".igs", read_cad, true}};
 
 const MeshFormat* format_of(const fs::path& path) {
   const std::string end = lower_extension(path);

@@ -79,7 +79,7 @@ struct MeshContent {
 /// whole, an extension of the format that is needed and not known. Messages begin with the path.
 Result<MeshContent> read_mesh_content(const std::filesystem::path& path);
 
-/// Whether files of this name's format state their unit: glTF, FBX, COLLADA, 3MF, AMF.
+/// Whether files of this name's format state their unit: glTF, FBX, COLLADA, 3MF, AMF, STEP, IGES.
 bool states_unit(const std::filesystem::path& path);
 /// Whether a file of this name is a mesh that Limn reads.
 bool is_mesh_name(const std::filesystem::path& path);

@@ -18,6 +18,7 @@
 #include "scene/actions.h"
 #include "scene/marker_file.h"
 #include "scene/mesh_content.h"
+#include "scene/scene_loading.h"
 #include "scene/slot_folder.h"
 
 namespace limn::scene {
@@ -301,8 +302,8 @@ Status check_size(const Mesh& mesh, std::optional<LengthUnit> given) {
       likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
-Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path) {
-  auto mesh = load_mesh(file.path, file.units);
+Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path, const std::stop_token& stop) {
+  auto mesh = load_mesh(file.path, file.units, stop);
   if (!mesh) return error("{}: {}: {}", scene_path.string(), file.where, mesh.message());
   if (const Status size = check_size(*mesh, file.units); !size)
     return error("{}: {} ({}): {}", scene_path.string(), file.where, file.path.filename().string(),
@@ -367,7 +368,8 @@ Result<std::map<std::string, LengthUnit>> load_units(const fs::path& file) {
 Result<Variant> auto_import_mesh(const fs::path& file,
                                  const Slot& slot,
                                  std::span<const Variant> variants,
-                                 const std::map<std::string, LengthUnit>& known_units) {
+                                 const std::map<std::string, LengthUnit>& known_units,
+                                 const std::stop_token& stop) {
   const std::string name = file.stem().string();
   if (!is_utf8(name))
     return error("{}: expected a file name in UTF-8, found other bytes. Rename the file.",
@@ -380,7 +382,7 @@ Result<Variant> auto_import_mesh(const fs::path& file,
   Variant::AutoImported import{std::nullopt, false};
   if (known != known_units.end()) import.units = known->second;
   import.is_guess = !import.units && !states_unit(file);
-  LIMN_TRY(Mesh mesh, load_mesh(file, import.is_guess ? LengthUnit::metre : import.units));
+  LIMN_TRY(Mesh mesh, load_mesh(file, import.is_guess ? LengthUnit::metre : import.units, stop));
   if (import.is_guess) import.units = guessed_units(mesh);
   if (import.is_guess) mesh = scaled(std::move(mesh), *import.units);
   if (const Status size = check_size(mesh, import.units); !size)
@@ -399,11 +401,12 @@ struct LeftOut {
 Status load_variants(std::span<const MeshFile> listed,
                      const fs::path& path,
                      const fs::path& scene_folder,
+                     const std::stop_token& stop,
                      Slot* slot,
                      LeftOut* left_out) {
   std::vector<Variant> variants;
   for (std::size_t i = 0; i < listed.size(); ++i) {
-    auto mesh = load_named_mesh(listed[i], path);
+    auto mesh = load_named_mesh(listed[i], path, stop);
     if (mesh)
       variants.push_back({slot->variants[i].name, std::move(*mesh)});
     else
@@ -413,7 +416,7 @@ Status load_variants(std::span<const MeshFile> listed,
   LIMN_TRY(const auto known_units, load_units(folder / "units.json"));
   const SlotFolder files = list_slot_folder(folder);
   for (const fs::path& file : files.meshes) {
-    auto variant = auto_import_mesh(file, *slot, variants, known_units);
+    auto variant = auto_import_mesh(file, *slot, variants, known_units, stop);
     if (variant)
       variants.push_back(std::move(*variant));
     else
@@ -444,9 +447,13 @@ void find_strays(const Scene& scene, LeftOut* left_out) {
                        as_utf8(other.path.string()), names)});
 }
 
-Status load_files(const Reader& reader, const fs::path& path, Scene* scene, LeftOut* left_out) {
+Status load_files(const Reader& reader,
+                  const fs::path& path,
+                  const std::stop_token& stop,
+                  Scene* scene,
+                  LeftOut* left_out) {
   if (scene->prototype) {
-    LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path));
+    LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path, stop));
     for (Material& material : scene->prototype->mesh.materials)
       material.cut_below = 0;  // the physical prototype has no transparent parts
     if (reader.albedo_image) {
@@ -457,7 +464,7 @@ Status load_files(const Reader& reader, const fs::path& path, Scene* scene, Left
   for (Slot& slot : scene->slots) {
     const auto own = listed.first(slot.variants.size());
     listed = listed.subspan(own.size());
-    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, &slot, left_out));
+    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, stop, &slot, left_out));
   }
   find_strays(*scene, left_out);
   return {};
@@ -491,6 +498,13 @@ void leave_out_empty_slots(Scene* scene) {
 Result<Scene> load_scene(const fs::path& path,
                          std::vector<SkippedVariant>* skipped_variants,
                          EmptySlots empty_slots) {
+  return load_scene(path, skipped_variants, empty_slots, std::stop_token());
+}
+
+Result<Scene> load_scene(const fs::path& path,
+                         std::vector<SkippedVariant>* skipped_variants,
+                         EmptySlots empty_slots,
+                         const std::stop_token& stop) {
   std::error_code code;
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
@@ -510,7 +524,7 @@ Result<Scene> load_scene(const fs::path& path,
   if (const Status distinct = check_distinct(constellations(scene)); !distinct)
     return error("{}: {}", file.string(), distinct.message());
   LeftOut left_out;
-  LIMN_TRY_STATUS(load_files(reader, file, &scene, &left_out));
+  LIMN_TRY_STATUS(load_files(reader, file, stop, &scene, &left_out));
   if (!skipped_variants && !left_out.variants.empty()) return error("{}", left_out.variants[0].why);
   if (empty_slots == EmptySlots::left_out) leave_out_empty_slots(&scene);
   for (const auto& list : {left_out.variants, left_out.others})

@@ -28,10 +28,10 @@ std::string reason(const std::string& end) {
   static const std::map<std::string, std::string> k_reasons = [] {
     std::map<std::string, std::string> all;
     const std::string mesh = " Export it as a mesh, such as .glb, .3mf or .stl.";
-    for (const char* e : {".step", ".stp",    ".iges",   ".igs",   ".x_t", ".x_b",     ".sat",        ".brep",
-                          ".jt",   ".sldprt", ".sldasm", ".ipt",   ".iam", ".catpart", ".catproduct", ".prt",
-                          ".asm",  ".par",    ".f3d",    ".fcstd", ".3dm", ".dwg",     ".scad"})
-      all[e] = "it is a CAD file, which holds no triangles." + mesh;
+    for (const char* e :
+         {".x_t", ".x_b", ".sat", ".brep", ".jt", ".sldprt", ".sldasm", ".ipt", ".iam", ".catpart",
+          ".catproduct", ".prt", ".asm", ".par", ".f3d", ".fcstd", ".3dm", ".dwg", ".scad"})
+      all[e] = "it is a CAD file of a format that Limn does not read. Export it as STEP (.step).";
     for (const char* e : {".blend", ".max", ".ma", ".mb", ".c4d", ".skp", ".ztl", ".hip", ".lxo", ".spp"})
       all[e] = "it is a project of a modelling program." + mesh;
     for (const char* e : {".zip", ".rar", ".7z", ".gz", ".tgz", ".tar", ".xz", ".bz2", ".usdz", ".zae"})

@@ -1,5 +1,8 @@
 #include "session/scene_watch.h"
 
+#include "scene/cad_file.h"
+#include "scene/scene_loading.h"
+
 namespace limn::session {
 namespace {
 
@@ -13,7 +16,7 @@ constexpr auto k_left_alone = std::chrono::milliseconds(150);
 
 SceneWatch::SceneWatch(fs::path folder) : folder_(std::move(folder)), loaded_(listed()), seen_(loaded_) {}
 
-// Lists all files except looks, pairings and comments, which the session and the remote write.
+// Lists all files except what the session, the remote and the reader of CAD files write.
 SceneWatch::Files SceneWatch::listed() const {
   Files files;
   std::error_code none;
@@ -22,7 +25,8 @@ SceneWatch::Files SceneWatch::listed() const {
     if (at.depth() == 0 && at->path().filename() == "looks") at.disable_recursion_pending();
     std::error_code gone;
     const fs::path name = at->path().filename();
-    const bool is_own = at.depth() == 0 && (name == "pairings.json" || name == "comments.json");
+    const bool is_own = (at.depth() == 0 && (name == "pairings.json" || name == "comments.json")) ||
+                        scene::is_cad_cache_name(name);
     if (!is_own && at->is_regular_file(gone)) {
       const auto time = at->last_write_time(gone);
       const auto size = at->file_size(gone);
@@ -48,11 +52,12 @@ std::optional<Result<LoadedScene>> SceneWatch::take_changed_scene() {
   }
   if (seen_ == loaded_ || now - changed_at_ < k_left_alone) return std::nullopt;
   loaded_ = seen_;
-  loading_ = std::async(std::launch::async, [folder = folder_]() -> Result<LoadedScene> {
-    LoadedScene loaded;
-    LIMN_TRY(loaded.scene, scene::load_scene(folder, &loaded.skipped_variants, scene::EmptySlots::kept));
-    return loaded;
-  });
+  loading_ =
+      std::async(std::launch::async, [folder = folder_, s = stop_.get_token()]() -> Result<LoadedScene> {
+        LoadedScene in;
+        LIMN_TRY(in.scene, scene::load_scene(folder, &in.skipped_variants, scene::EmptySlots::kept, s));
+        return in;
+      });
   return std::nullopt;
 }
 

@@ -5,6 +5,7 @@
 #include <future>
 #include <map>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -25,6 +26,7 @@ struct LoadedScene {
 class SceneWatch {
  public:
   explicit SceneWatch(std::filesystem::path folder);
+  ~SceneWatch() { stop_.request_stop(); }  ///< A CAD file that is being read is left.
 
   /// The scene after its files have changed, or an error if it cannot be loaded; once for each change. Checks
   /// the folder ten times a second at most, and never waits.
@@ -38,6 +40,7 @@ class SceneWatch {
   std::filesystem::path folder_;
   Files loaded_, seen_;
   Clock::time_point looked_at_, changed_at_;
+  std::stop_source stop_;
   std::future<Result<LoadedScene>> loading_;
 };
 

@@ -1,9 +1,12 @@
-# What `cmake --install BUILD [--prefix X] [--component program|data|docs|library|development|python]` installs. The installed tree can be moved: the program
+# What `cmake --install BUILD [--prefix X] [--component program|cad|data|docs|library|development|python]` installs. The installed tree can be moved: the program
 # finds its data and its own libraries from where it is (core/data_folder.h).
 set(data ${CMAKE_INSTALL_DATADIR}/limn)
 set(install_files ${PROJECT_SOURCE_DIR}/tools/install)
 
 install(TARGETS limn RUNTIME COMPONENT program)
+if(TARGET limn-cad)
+  install(TARGETS limn-cad RUNTIME COMPONENT cad)
+endif()
 install(TARGETS limn_room_dds limn_video LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
 install(FILES ${install_files}/limn.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT program)
 install(FILES ${install_files}/io.github.limn.metainfo.xml

@@ -8,6 +8,7 @@
 #include "apps/import.h"
 #include "apps/import_rig.h"
 #include "apps/render.h"
+#include "exchange/cad_import.h"
 
 namespace limn::apps {
 namespace {
@@ -42,6 +43,49 @@ CLI::App* add_import_rig(CLI::App* import, Run& run) {
       ->type_name("WIDTHxHEIGHT");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each device");
   command->callback([options, &run] { run = [options] { return report_result(run_import_rig(*options)); }; });
+  return command;
+}
+
+CLI::App* add_import_cad(CLI::App* import, Run& run) {
+  auto* command = import->add_subcommand("cad", "Write the solids of a STEP or IGES file as meshes");
+  command->footer(
+      "Names, colours, places and the unit come from the file; all meshes are in metres and in its frame. A "
+      "scene, a slot's\n"
+      "folder and limn align also take the file itself, as one part with a chord error of 0.1 mm.\n"
+      "part: everything in one mesh, OUT.glb. parts: a mesh for each solid at each place, for slots of their "
+      "own.\n"
+      "variants: a mesh for each solid, for the variants of one slot.\n"
+      "Needs the program limn-cad (apt install limn-cad).\n"
+      "Example: limn import cad mirror.step --as part --out scene/mirror.glb\n"
+      "Example: limn import cad mirrors.step --as variants --out scene/slots/mirror\n"
+      "Example: limn import cad car.step --as parts --chord-mm 0.5 --out scene/car");
+  auto options = std::make_shared<exchange::CadImportOptions>();
+  command->add_option("file", options->file, "CAD file: .step, .stp, .iges or .igs")
+      ->type_name("FILE")
+      ->required();
+  add_choice(command, "--as", &options->as, exchange::k_cad_taken_as,
+             "What the solids become: part, parts or variants (without it: part)");
+  command->add_option("--out", options->out, "File NAME.glb to write; a folder for parts and variants")
+      ->type_name("OUT")
+      ->required();
+  command
+      ->add_option("--chord-mm", options->chord_mm, "Largest distance between surfaces and triangles, in mm")
+      ->check(CLI::Range(0.0001, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--angle-deg", options->angle_deg,
+                   "Largest angle between the normals at the ends of a triangle's side, in degrees")
+      ->check(CLI::Range(1.0, 90.0))
+      ->capture_default_str();
+  command->add_option("--minutes", options->minutes, "Time that limn-cad may take, in minutes")
+      ->check(CLI::Range(0.01, 10000.0))
+      ->capture_default_str();
+  command->add_option("--memory-gb", options->memory_gb, "Memory that limn-cad may take, in GB")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "Print limn.cad/1 instead of a line for each solid");
+  command->callback(
+      [options, &run] { run = [options] { return report_result(exchange::import_cad(*options)); }; });
   return command;
 }
 
@@ -215,7 +259,8 @@ void add_import(CLI::App& app, Run& run) {
       "Reads archives of MPCDI 1 and 2, and XML without an archive as Christie's Mystique writes it (poses "
       "without maps).\n"
       "Example: limn import theirs.mpcdi --out rig\n"
-      "Rigs of other programs: limn import rig --help");
+      "Rigs of other programs: limn import rig --help\n"
+      "STEP and IGES files: limn import cad --help");
   auto options = std::make_shared<ImportOptions>();
   command->add_option("file", options->file, "Archive (.mpcdi) or XML (.mpcdi.xml)")->type_name("FILE");
   command
@@ -223,9 +268,9 @@ void add_import(CLI::App& app, Run& run) {
                    "Rig folder to write, in the file's own coordinate frame (profile sl)")
       ->type_name("FOLDER");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each region");
-  const CLI::App* rig = add_import_rig(command, run);
-  command->callback([options, rig, &run] {
-    if (rig->parsed()) return;  // its own callback has set `run`
+  const CLI::App *rig = add_import_rig(command, run), *cad = add_import_cad(command, run);
+  command->callback([options, rig, cad, &run] {
+    if (rig->parsed() || cad->parsed()) return;  // its own callback has set `run`
     if (options->file.empty()) throw CLI::RequiredError("file");
     run = [options] { return report_result(run_import(*options)); };
   });

@@ -26,7 +26,9 @@ ValueKind value_kind(const std::string& word) {
   if (word == "IMAGE")
     return {ValueKind::files,
             {"png", "jpg", "jpeg", "pgm", "ppm", "pbm", "bmp", "tif", "tiff", "webp", "tga"}};
-  if (word == "MESH") return {ValueKind::files, {"glb", "gltf", "obj", "stl", "ply", "3mf", "fbx"}};
+  if (word == "MESH")
+    return {ValueKind::files,
+            {"glb", "gltf", "obj", "stl", "ply", "3mf", "fbx", "step", "stp", "iges", "igs"}};
   if (word.starts_with("FILE.")) return {ValueKind::files, {word.substr(5)}};
   return {};
 }

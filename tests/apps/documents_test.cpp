@@ -56,7 +56,9 @@ TEST(Documents, EveryCommandAndOptionExists) {
       if (help == helps.end()) {
         const test::Outcome outcome = test::run_limn({quoted.command, "--help"});
         help = helps.emplace(quoted.command, outcome.out).first;
-        if (quoted.command == "import") help->second += test::run_limn({"import", "rig", "--help"}).out;
+        if (quoted.command == "import")
+          for (const char* kind : {"rig", "cad"})
+            help->second += test::run_limn({"import", kind, "--help"}).out;
         EXPECT_EQ(outcome.code, 0) << quoted.where << ": limn " << quoted.command;
       }
       if (quoted.command == "bench") continue;  // its options belong to the benches

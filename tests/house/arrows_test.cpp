@@ -41,6 +41,7 @@ const std::map<std::string, Names>& allowed() {
       {"sim", {"core", "scene", "device"}},
       {"device/gui", {"core", "device"}},
       {"exchange", {"core", "scene", "projector"}},
+      {"exchange/cad", {"core", "scene"}},
       {"exchange/poses", {"core"}},
       {"exchange/printing", {"core", "calib", "tracker"}},
       {"wizard/design", {"core", "calib", "tracker"}},
@@ -89,6 +90,7 @@ const std::map<std::string, Names>& guests() {
       {"assimp/", {"scene"}},
       {"meshoptimizer", {"scene"}},
       {"draco/", {"scene"}},
+      {"opencascade/", {"exchange/cad"}},  // a program of its own, in an optional package
       {"embree3/", {"sim"}},
       {"embree4/", {"sim"}},
       {"GLFW/", {"device", "device/gui", "session"}},

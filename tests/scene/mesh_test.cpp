@@ -561,7 +561,7 @@ TEST(Mesh, BadFilesAreErrorsThatNameThem) {
       {"lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n", "triangles"},
       {"flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "triangles"},
       {"nan.stl", binary_stl(triangles), "finite"},
-      {"part.step", "ISO-10303-21;", "glb"},
+      {"part.blend", "BLENDER", "glb"},
   };
   for (const auto& bad : cases) {
     const auto mesh = load_mesh(written(bad.name, bad.content), LengthUnit::metre);

@@ -319,7 +319,7 @@ TEST(Scene, WhatIsNoMeshInASlotsFolderIsListedWithTheReason) {
     fs::create_directories((slots / taken).parent_path());
     ASSERT_TRUE(write_file(slots / taken, mesh));
   }
-  for (const char* name : {"housing.STEP", "project.blend", "all.zip", "notes.txt", "wood.png", "part.mtl",
+  for (const char* name : {"housing.sldprt", "project.blend", "all.zip", "notes.txt", "wood.png", "part.mtl",
                            "part.bin", ".hidden", "~lock"})
     ASSERT_TRUE(write_file(slots / "mirror" / name, "x"));
   std::vector<SkippedVariant> skipped;
@@ -329,7 +329,7 @@ TEST(Scene, WhatIsNoMeshInASlotsFolderIsListedWithTheReason) {
   std::map<std::string, std::string> reasons;
   for (const SkippedVariant& item : skipped) reasons[item.slot + "/" + item.variant] = item.why;
   const std::map<std::string, std::string> expected = {
-      {"mirror/housing.STEP", "it is a CAD file"},
+      {"mirror/housing.sldprt", "Export it as STEP"},
       {"mirror/project.blend", "a project of a modelling program"},
       {"mirror/all.zip", "Unpack it"},
       {"mirror/notes.txt", "it is no mesh that Limn reads"},

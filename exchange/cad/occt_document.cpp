@@ -1,0 +1,239 @@
+#include "exchange/cad/occt_document.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <map>
+#include <opencascade/APIHeaderSection_MakeHeader.hxx>
+#include <opencascade/IGESCAFControl_Reader.hxx>
+#include <opencascade/IGESData_GlobalSection.hxx>
+#include <opencascade/IGESData_IGESModel.hxx>
+#include <opencascade/Interface_Static.hxx>
+#include <opencascade/STEPCAFControl_Reader.hxx>
+#include <opencascade/STEPControl_Reader.hxx>
+#include <opencascade/StepBasic_Product.hxx>
+#include <opencascade/StepBasic_ProductDefinition.hxx>
+#include <opencascade/StepBasic_ProductDefinitionFormation.hxx>
+#include <opencascade/StepData_StepModel.hxx>
+#include <opencascade/StepRepr_NextAssemblyUsageOccurrence.hxx>
+#include <opencascade/StepRepr_RepresentationItem.hxx>
+#include <opencascade/StepShape_ManifoldSolidBrep.hxx>
+#include <opencascade/StepShape_ShellBasedSurfaceModel.hxx>
+#include <opencascade/TColStd_SequenceOfAsciiString.hxx>
+#include <opencascade/TransferBRep.hxx>
+#include <opencascade/Transfer_TransientProcess.hxx>
+#include <opencascade/XCAFApp_Application.hxx>
+#include <opencascade/XCAFDoc_DocumentTool.hxx>
+#include <opencascade/XCAFDoc_ShapeTool.hxx>
+#include <opencascade/XSControl_TransferReader.hxx>
+#include <opencascade/XSControl_WorkSession.hxx>
+#include <set>
+
+#include "core/utf8.h"
+
+namespace limn::cad {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double k_read_percent = 30, k_transferred_percent = 60;
+
+std::string text_of(const Handle(TCollection_HAsciiString) & text) {
+  return text.IsNull() ? std::string() : as_utf8(text->ToCString());
+}
+
+std::string lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+Handle(TDocStd_Document) new_document() {
+  Handle(TDocStd_Document) document;
+  XCAFApp_Application::GetApplication()->NewDocument("BinXCAF", document);
+  return document;
+}
+
+Error damaged(const fs::path& path, const std::string& format, const std::string& found) {
+  return error("{}: expected a whole {} file with shapes, found {}. Export it again.", path.string(), format,
+               found);
+}
+
+// ---- STEP
+
+std::string step_schema(const Handle(StepData_StepModel) & model) {
+  const APIHeaderSection_MakeHeader header(model);
+  if (!header.HasFs() || header.NbSchemaIdentifiers() < 1) return "";
+  const std::string stated = text_of(header.SchemaIdentifiersValue(1)), name = lower(stated);
+  const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
+  if (has("ap242") || has("managed_model")) return "AP242";
+  if (has("ap214") || has("automotive_design")) return "AP214";
+  if (has("ap203") || has("config_control") || has("configuration_control")) return "AP203";
+  return stated;
+}
+
+struct NamedUnit {
+  const char* name;
+  double metres;
+};
+
+// The names of length units that OpenCASCADE reports for STEP files.
+constexpr NamedUnit k_step_units[] = {{"millimetre", 1e-3}, {"millimeter", 1e-3}, {"mm", 1e-3},
+                                      {"centimetre", 1e-2}, {"centimeter", 1e-2}, {"cm", 1e-2},
+                                      {"metre", 1},         {"meter", 1},         {"m", 1},
+                                      {"inch", 0.0254},     {"in", 0.0254},       {"foot", 0.3048},
+                                      {"ft", 0.3048},       {"micrometre", 1e-6}, {"kilometre", 1e3},
+                                      {"decimetre", 0.1},   {"mile", 1609.344},   {"mil", 2.54e-5}};
+
+void read_step_unit(STEPControl_Reader& reader, OcctDocument* out) {
+  TColStd_SequenceOfAsciiString lengths, angles, solid_angles;
+  reader.FileUnits(lengths, angles, solid_angles);
+  std::set<std::string> names;
+  for (const TCollection_AsciiString& length : lengths) names.insert(lower(as_utf8(length.ToCString())));
+  if (names.empty()) {
+    out->warnings.push_back("the file states no length unit; millimetres are assumed");
+    return;
+  }
+  out->unit = lower(as_utf8(lengths.First().ToCString()));
+  if (names.size() > 1)
+    out->warnings.push_back("parts of the file are in different units; each keeps its own");
+  const auto* const known = std::find_if(std::begin(k_step_units), std::end(k_step_units),
+                                         [&](const NamedUnit& unit) { return out->unit == unit.name; });
+  if (known != std::end(k_step_units)) out->metres_per_unit = known->metres;
+}
+
+std::string product_name(const Handle(StepBasic_ProductDefinition) & definition) {
+  if (definition.IsNull() || definition->Formation().IsNull() ||
+      definition->Formation()->OfProduct().IsNull())
+    return "?";
+  return text_of(definition->Formation()->OfProduct()->Name());
+}
+
+using Products = std::map<const Standard_Transient*, std::vector<Handle(StepBasic_ProductDefinition)>>;
+
+// The names along a way from `at` that comes back to itself; empty: there is none. OpenCASCADE would follow
+// such a way until memory ends.
+std::string circle_from(const Handle(StepBasic_ProductDefinition) & at,
+                        const Products& inside,
+                        std::vector<const Standard_Transient*>* way,
+                        std::set<const Standard_Transient*>* done) {
+  if (std::find(way->begin(), way->end(), at.get()) != way->end()) return product_name(at);
+  const auto parts = inside.find(at.get());
+  if (parts == inside.end() || done->contains(at.get())) return "";
+  if (way->size() > 1000) return product_name(at) + ", in more than 1000 levels";
+  way->push_back(at.get());
+  for (const auto& part : parts->second)
+    if (const std::string circle = circle_from(part, inside, way, done); !circle.empty())
+      return product_name(at) + " -> " + circle;
+  way->pop_back();
+  done->insert(at.get());
+  return "";
+}
+
+std::string circle_in(const Handle(StepData_StepModel) & model) {
+  Products inside;
+  std::vector<Handle(StepBasic_ProductDefinition)> all;
+  for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
+    const auto use = Handle(StepRepr_NextAssemblyUsageOccurrence)::DownCast(model->Value(i));
+    if (use.IsNull() || use->RelatingProductDefinition().IsNull() || use->RelatedProductDefinition().IsNull())
+      continue;
+    inside[use->RelatingProductDefinition().get()].push_back(use->RelatedProductDefinition());
+    all.push_back(use->RelatingProductDefinition());
+  }
+  std::set<const Standard_Transient*> done;
+  for (const auto& product : all) {
+    std::vector<const Standard_Transient*> way;
+    if (std::string circle = circle_from(product, inside, &way, &done); !circle.empty()) return circle;
+  }
+  return "";
+}
+
+// Names of the STEP entities that became solids or surface models.
+void read_solid_names(const Handle(XSControl_WorkSession) & session,
+                      const Handle(StepData_StepModel) & model,
+                      SolidNames* names) {
+  const Handle(Transfer_TransientProcess) process = session->TransferReader()->TransientProcess();
+  for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
+    const Handle(Standard_Transient) entity = model->Value(i);
+    if (!entity->IsKind(STANDARD_TYPE(StepShape_ManifoldSolidBrep)) &&
+        !entity->IsKind(STANDARD_TYPE(StepShape_ShellBasedSurfaceModel)))
+      continue;
+    const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
+    const std::string name = text_of(Handle(StepRepr_RepresentationItem)::DownCast(entity)->Name());
+    if (!shape.IsNull() && !name.empty()) names->Bind(shape.Located(TopLoc_Location()), name);
+  }
+}
+
+Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
+  OcctDocument out{.document = new_document(), .format = "STEP"};
+  STEPCAFControl_Reader reader;
+  reader.SetLayerMode(false);
+  reader.SetPropsMode(false);
+  reader.SetGDTMode(false);
+  reader.SetMatMode(false);
+  reader.SetViewMode(false);
+  if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
+    return damaged(path, "STEP", "one that cannot be parsed");
+  const Handle(StepData_StepModel) model = reader.ChangeReader().StepModel();
+  if (model.IsNull() || model->NbEntities() == 0) return damaged(path, "STEP", "no entities");
+  out.schema = step_schema(model);
+  read_step_unit(reader.ChangeReader(), &out);
+  if (const std::string circle = circle_in(model); !circle.empty())
+    return error("{}: expected an assembly that does not contain itself, found {}. Remove one of these uses.",
+                 path.string(), circle);
+  progress->begin_stage("translating", k_read_percent, k_transferred_percent);
+  if (!reader.Transfer(out.document, progress->Start())) return damaged(path, "STEP", "no shapes");
+  read_solid_names(reader.ChangeReader().WS(), model, &out.solid_names);
+  NCollection_DataMap<TCollection_AsciiString, Handle(STEPCAFControl_ExternFile)>::Iterator other(
+      reader.ExternFiles());
+  for (; other.More(); other.Next()) out.other_files.emplace_back(other.Key().ToCString());
+  return out;
+}
+
+// ---- IGES
+
+// The units by the numbers that IGES has for them, from 1; number 3 means that the unit is named.
+constexpr std::array<const char*, 11> k_iges_units = {"inch",       "millimetre", "",          "foot",
+                                                      "mile",       "metre",      "kilometre", "mil",
+                                                      "micrometre", "centimetre", "microinch"};
+
+void read_iges_unit(const IGESData_GlobalSection& global, OcctDocument* out) {
+  const int number = global.UnitFlag();
+  const std::string name = lower(text_of(global.UnitName()));
+  const bool is_numbered = number >= 1 && number <= static_cast<int>(k_iges_units.size()) && number != 3;
+  out->unit = is_numbered ? k_iges_units.at(static_cast<std::size_t>(number) - 1) : name;
+  out->metres_per_unit = 1e-3 * global.UnitValue();
+  const bool is_known = is_numbered || std::any_of(std::begin(k_step_units), std::end(k_step_units),
+                                                   [&](const NamedUnit& unit) { return name == unit.name; });
+  if (!is_known)
+    out->warnings.push_back(
+        fmt::format("the file's length unit '{}' (number {}) is unknown; {:.6g} mm are assumed", name, number,
+                    1e3 * out->metres_per_unit));
+}
+
+Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
+  OcctDocument out{.document = new_document(), .format = "IGES"};
+  IGESCAFControl_Reader reader;
+  reader.SetReadVisible(true);
+  if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
+    return damaged(path, "IGES", "one that cannot be parsed");
+  const auto model = Handle(IGESData_IGESModel)::DownCast(reader.Model());
+  if (model.IsNull() || model->NbEntities() == 0) return damaged(path, "IGES", "no entities");
+  const IGESData_GlobalSection& global = model->GlobalSection();
+  read_iges_unit(global, &out);
+  progress->begin_stage("translating", k_read_percent, k_transferred_percent);
+  if (!reader.Transfer(out.document, progress->Start())) return damaged(path, "IGES", "no shapes");
+  return out;
+}
+
+}  // namespace
+
+Result<OcctDocument> read_document(const fs::path& path, ProgressLines* progress) {
+  const std::string end = lower(path.extension().string());
+  progress->begin_stage("reading", 0, k_read_percent);
+  if (end == ".step" || end == ".stp") return read_step(path, progress);
+  if (end == ".iges" || end == ".igs") return read_iges(path, progress);
+  return error("{}: expected a STEP or IGES file (.step, .stp, .iges or .igs), found '{}'.", path.string(),
+               path.extension().string());
+}
+
+}  // namespace limn::cad

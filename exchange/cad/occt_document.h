@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <opencascade/NCollection_DataMap.hxx>
+#include <opencascade/TDocStd_Document.hxx>
+#include <opencascade/TopTools_ShapeMapHasher.hxx>
+#include <opencascade/TopoDS_Shape.hxx>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "exchange/cad/progress_lines.h"
+
+namespace limn::cad {
+
+using SolidNames = NCollection_DataMap<TopoDS_Shape, std::string, TopTools_ShapeMapHasher>;
+
+/// A CAD file in OpenCASCADE's document (XDE), whose shapes are in millimetres, with what the document does
+/// not keep.
+struct OcctDocument {
+  Handle(TDocStd_Document) document;
+  std::string format = {}, schema = {}, unit = {};  ///< As CadModel's.
+  double metres_per_unit = 1e-3;
+  std::vector<std::string> other_files = {};  ///< STEP files that it refers to, relative to its folder.
+  SolidNames solid_names = {};                ///< The document itself names only products.
+  std::vector<std::string> warnings = {};
+};
+
+/// Reads a STEP or IGES file, in the format that its name ends in. Errors: not readable, damaged, without
+/// shapes, an assembly that contains itself.
+Result<OcctDocument> read_document(const std::filesystem::path& path, ProgressLines* progress);
+
+}  // namespace limn::cad

@@ -1,0 +1,377 @@
+#include "exchange/cad/read_cad_model.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencascade/BRepBuilderAPI_Sewing.hxx>
+#include <opencascade/BRep_Builder.hxx>
+#include <opencascade/TDF_Label.hxx>
+#include <opencascade/TDF_Tool.hxx>
+#include <opencascade/TDataStd_Name.hxx>
+#include <opencascade/TopExp_Explorer.hxx>
+#include <opencascade/TopoDS.hxx>
+#include <opencascade/TopoDS_Compound.hxx>
+#include <opencascade/XCAFDoc_ColorTool.hxx>
+#include <opencascade/XCAFDoc_DocumentTool.hxx>
+#include <opencascade/XCAFDoc_ShapeTool.hxx>
+#include <opencascade/XCAFPrs.hxx>
+#include <opencascade/XCAFPrs_DocumentExplorer.hxx>
+#include <optional>
+
+#include "core/file.h"
+#include "core/utf8.h"
+#include "exchange/cad/occt_document.h"
+#include "exchange/cad/triangles.h"
+#include "scene/fingerprint.h"
+
+namespace limn::cad {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr float k_no_colour = 0.6F;  // as meshes that state none
+constexpr double k_translated_percent = 60, k_cut_percent = 95;
+
+Colour colour_of(const XCAFPrs_Style& style) {
+  if (!style.IsSetColorSurf()) return {k_no_colour, k_no_colour, k_no_colour, 1};
+  const Quantity_ColorRGBA& stated = style.GetColorSurfRGBA();  // linear
+  const Quantity_Color& rgb = stated.GetRGB();
+  return {static_cast<float>(rgb.Red()), static_cast<float>(rgb.Green()), static_cast<float>(rgb.Blue()),
+          stated.Alpha()};
+}
+
+std::string name_of(const TDF_Label& label) {
+  Handle(TDataStd_Name) name;
+  if (label.IsNull() || !label.FindAttribute(TDataStd_Name::GetID(), name)) return "";
+  const TCollection_ExtendedString& wide = name->Get();
+  std::string text(static_cast<std::size_t>(wide.LengthOfCString()) + 1, '\0');
+  char* begin = text.data();
+  wide.ToUTF8CString(begin);
+  text.resize(text.find('\0'));
+  return as_utf8(text);
+}
+
+// A product at one place.
+struct Leaf {
+  TDF_Label product = {};
+  std::string name = {}, key = {};  // two leaves with the same key look the same
+  std::vector<std::string> path = {};
+  gp_Trsf placed = {};
+  XCAFPrs_Style style = {};          // for faces without a colour of their own
+  std::optional<Colour> whole = {};  // the colour of this place, which replaces all others
+};
+
+Eigen::Matrix4d matrix_of(const gp_Trsf& placed) {
+  Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) m(row, column) = placed.Value(row + 1, column + 1);
+    m(row, 3) = 1e-3 * placed.Value(row + 1, 4);
+  }
+  return m;
+}
+
+// The colour that an instance states for itself.
+std::optional<Colour> own_colour(const Handle(XCAFDoc_ColorTool) & colours, const TDF_Label& instance) {
+  Quantity_ColorRGBA colour;
+  for (const XCAFDoc_ColorType type : {XCAFDoc_ColorSurf, XCAFDoc_ColorGen}) {
+    if (!colours->GetColor(instance, type, colour)) continue;
+    XCAFPrs_Style style;
+    style.SetColorSurf(colour);
+    return colour_of(style);
+  }
+  return std::nullopt;
+}
+
+struct Leaves {
+  std::vector<Leaf> all;
+  int hidden = 0;
+};
+
+Leaves leaves_of(const Handle(TDocStd_Document) & document) {
+  Leaves leaves;
+  const Handle(XCAFDoc_ColorTool) colours = XCAFDoc_DocumentTool::ColorTool(document->Main());
+  for (XCAFPrs_DocumentExplorer at(document, XCAFPrs_DocumentExplorerFlags_OnlyLeafNodes); at.More();
+       at.Next()) {
+    const XCAFPrs_DocumentNode& node = at.Current();
+    if (!node.Style.IsVisible()) {
+      ++leaves.hidden;
+      continue;
+    }
+    Leaf leaf{.product = node.RefLabel, .name = name_of(node.RefLabel)};
+    if (leaf.name.empty()) leaf.name = name_of(node.Label);
+    for (int depth = 0; depth < at.CurrentDepth(); ++depth)
+      leaf.path.push_back(name_of(at.Current(depth).RefLabel));
+    // Some files have a nameless product for the shape inside a named one.
+    while (leaf.name.empty() && !leaf.path.empty()) {
+      leaf.name = leaf.path.back();
+      leaf.path.pop_back();
+    }
+    leaf.placed = node.Location.Transformation();
+    leaf.style = node.Style;
+    if (node.Label != node.RefLabel) leaf.whole = own_colour(colours, node.Label);
+    TCollection_AsciiString entry;
+    TDF_Tool::Entry(node.RefLabel, entry);
+    leaf.key = entry.ToCString();
+    const Colour colour = leaf.whole ? *leaf.whole : colour_of(leaf.style);
+    leaf.key += fmt::format("{}{}", leaf.whole.has_value(), fmt::join(colour, " "));
+    leaves.all.push_back(std::move(leaf));
+  }
+  return leaves;
+}
+
+// The colours of a product's faces.
+class FaceColours {
+ public:
+  explicit FaceColours(const Leaf& leaf) : leaf_(leaf) {
+    if (leaf.whole) return;
+    XCAFPrs_IndexedDataMapOfShapeStyle styles;
+    XCAFPrs::CollectStyleSettings(leaf.product, TopLoc_Location(), styles);
+    for (int type = TopAbs_FACE; type >= TopAbs_COMPOUND; --type)  // a face's own colour comes first
+      for (XCAFPrs_IndexedDataMapOfShapeStyle::Iterator at(styles); at.More(); at.Next())
+        if (at.Key().ShapeType() == type && at.Value().IsSetColorSurf()) bind(at.Key(), at.Value());
+  }
+
+  Colour operator()(const TopoDS_Face& face) const {
+    if (leaf_.whole) return *leaf_.whole;
+    const XCAFPrs_Style* own = styles_.Seek(face);
+    return colour_of(own ? *own : leaf_.style);
+  }
+
+ private:
+  void bind(const TopoDS_Shape& shape, const XCAFPrs_Style& style) {
+    for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next())
+      if (!styles_.IsBound(at.Current())) styles_.Bind(at.Current(), style);
+  }
+  const Leaf& leaf_;
+  NCollection_DataMap<TopoDS_Shape, XCAFPrs_Style, TopTools_ShapeMapHasher> styles_;
+};
+
+// A solid of a product, or its surfaces outside solids.
+struct Body {
+  TopoDS_Shape shape;
+  std::string name;
+};
+
+std::vector<Body> bodies_of(const Leaf& leaf, const SolidNames& names) {
+  const TopoDS_Shape product = XCAFDoc_ShapeTool::GetShape(leaf.product);
+  std::vector<Body> bodies;
+  if (product.IsNull()) return bodies;
+  for (TopExp_Explorer at(product, TopAbs_SOLID); at.More(); at.Next()) {
+    const std::string* name = names.Seek(at.Current().Located(TopLoc_Location()));
+    bodies.push_back({at.Current(), name ? *name : ""});
+  }
+  TopoDS_Compound rest;
+  const BRep_Builder builder;
+  builder.MakeCompound(rest);
+  int loose_faces = 0;
+  for (TopExp_Explorer at(product, TopAbs_FACE, TopAbs_SOLID); at.More(); at.Next(), ++loose_faces)
+    builder.Add(rest, at.Current());
+  if (loose_faces > 0) bodies.push_back({rest, ""});
+  // The product's name is what people know; the names of its solids matter where there are several.
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    if (bodies.size() == 1 && !leaf.name.empty())
+      bodies[i].name = leaf.name;
+    else if (bodies[i].name.empty())
+      bodies[i].name = leaf.name.empty() ? leaf.name : fmt::format("{} {}", leaf.name, i + 1);
+  }
+  return bodies;
+}
+
+using ShapeColours = NCollection_DataMap<TopoDS_Shape, Colour, TopTools_ShapeMapHasher>;
+
+// Faces that are joined along their edges, with their colours.
+struct Joined {
+  TopoDS_Shape shape;
+  ShapeColours colours;
+  Colour operator()(const TopoDS_Face& face) const {
+    const Colour* own = colours.Seek(face);
+    return own ? *own : colour_of(XCAFPrs_Style());
+  }
+};
+
+Joined joined(const std::vector<std::pair<TopoDS_Shape, Colour>>& faces, double tolerance_mm) {
+  BRepBuilderAPI_Sewing sewing(tolerance_mm);
+  for (const auto& [face, colour] : faces) sewing.Add(face);
+  sewing.Perform();
+  Joined out{sewing.SewedShape(), {}};
+  for (const auto& [face, colour] : faces) {
+    const TopoDS_Shape now = sewing.IsModifiedSubShape(face) ? sewing.ModifiedSubShape(face) : face;
+    if (!out.colours.IsBound(now)) out.colours.Bind(now, colour);
+  }
+  return out;
+}
+
+// The faces of a product at a place, with their colours.
+void add_faces(const Leaf& leaf, const gp_Trsf& placed, std::vector<std::pair<TopoDS_Shape, Colour>>* faces) {
+  const FaceColours colours(leaf);
+  TopExp_Explorer at(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_FACE);
+  for (; at.More(); at.Next())
+    faces->emplace_back(at.Current().Moved(TopLoc_Location(placed)), colours(TopoDS::Face(at.Current())));
+}
+
+// Whether a shape of an IGES file is a thing by itself: it has solids, or is a named group of surfaces.
+bool is_whole(const Leaf& leaf) {
+  const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(leaf.product);
+  if (TopExp_Explorer(shape, TopAbs_SOLID).More()) return true;
+  TopExp_Explorer face(shape, TopAbs_FACE);
+  if (leaf.name.empty() || !face.More()) return false;
+  face.Next();
+  return face.More();
+}
+
+// A chord error of one digit with which a model of so many triangles at `chord_mm` has few enough. Their
+// number falls at least with the square root of the chord error.
+double sufficient_chord_mm(const Tessellation& how, double triangles) {
+  const double needed = how.chord_mm * std::pow(triangles / static_cast<double>(how.most_triangles), 2);
+  const double decade = std::pow(10, std::floor(std::log10(needed)));
+  for (const double digit : {1.0, 2.0, 5.0})
+    if (digit * decade >= needed) return digit * decade;
+  return 10 * decade;
+}
+
+Result<std::vector<CadSource>> sources_of(const fs::path& path, const std::vector<std::string>& others) {
+  std::vector<CadSource> sources;
+  LIMN_TRY(const std::string content, read_file(path));
+  sources.push_back({as_utf8(path.filename().string()), scene::fingerprint(content)});
+  for (const std::string& other : others) {
+    const fs::path file = path.parent_path() / other;
+    const auto inside = read_file(file);
+    sources.push_back({as_utf8(file.lexically_relative(path.parent_path()).string()),
+                       inside ? scene::fingerprint(*inside) : ""});
+  }
+  return sources;
+}
+
+// Builds the model leaf by leaf.
+class Builder {
+ public:
+  Builder(const fs::path& path, const OcctDocument& document, const Tessellation& how)
+      : path_(path), document_(document), how_(how) {}
+
+  Status add(const Leaf& leaf, double share_after) {
+    const auto [known, is_new] = meshes_of_.try_emplace(leaf.key);
+    if (is_new) known->second = cut(leaf);
+    for (const auto& [name, mesh] : known->second) add_node(name, leaf.path, mesh, leaf.placed);
+    return check_count(share_after);
+  }
+
+  // Error: there are too many triangles, when this share of the places is done.
+  Status check_count(double share) const {
+    if (triangles_ <= how_.most_triangles) return {};
+    const double expected = static_cast<double>(triangles_) / std::max(share, 1e-3);
+    return error(
+        "{}: expected at most {:g} million triangles, found about {:.2g} million with a chord error of {} "
+        "mm. "
+        "Allow a larger one: limn import cad FILE --chord-mm {}",
+        path_.string(), 1e-6 * static_cast<double>(how_.most_triangles), 1e-6 * expected, how_.chord_mm,
+        sufficient_chord_mm(how_, expected));
+  }
+
+  // Surfaces of no solid and no named group, as IGES files have them: joined along their edges into one mesh.
+  void add_loose(const std::vector<Leaf>& leaves) {
+    if (leaves.empty()) return;
+    std::vector<std::pair<TopoDS_Shape, Colour>> faces;
+    for (const Leaf& leaf : leaves) add_faces(leaf, leaf.placed, &faces);
+    const Joined whole = joined(faces, how_.chord_mm / 2);
+    const std::string name = leaves.size() == 1 ? leaves.front().name : "";
+    if (const auto mesh = cut_body({whole.shape, name}, whole)) add_node(name, {}, *mesh, gp_Trsf());
+  }
+
+  CadModel model;
+
+ private:
+  using Named = std::vector<std::pair<std::string, std::size_t>>;
+
+  void add_node(const std::string& name,
+                const std::vector<std::string>& path,
+                std::size_t mesh,
+                const gp_Trsf& placed) {
+    model.nodes.push_back({shown(name), path, mesh, matrix_of(placed)});
+    triangles_ += model.meshes[mesh].triangle_count();
+  }
+
+  std::string shown(const std::string& name) const {
+    return name.empty() ? as_utf8(path_.stem().string()) : name;
+  }
+
+  Named cut(const Leaf& leaf) {
+    Named named;
+    const bool has_solid = TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
+    if (document_.format == "IGES" && !has_solid) return cut_group(leaf);
+    const FaceColours colours(leaf);
+    for (const Body& body : bodies_of(leaf, document_.solid_names))
+      if (const auto mesh = cut_body(body, [&](const TopoDS_Face& face) { return colours(face); }))
+        named.emplace_back(body.name, *mesh);
+    return named;
+  }
+
+  // A named group of surfaces, joined along their edges.
+  Named cut_group(const Leaf& leaf) {
+    std::vector<std::pair<TopoDS_Shape, Colour>> faces;
+    add_faces(leaf, gp_Trsf(), &faces);
+    const Joined group = joined(faces, how_.chord_mm / 2);
+    const auto mesh = cut_body({group.shape, leaf.name}, group);
+    return mesh ? Named{{leaf.name, *mesh}} : Named{};
+  }
+
+  // The index of a body's mesh; nullopt when it has no surfaces.
+  std::optional<std::size_t> cut_body(const Body& body,
+                                      const std::function<Colour(const TopoDS_Face&)>& colours) {
+    Triangulated cut = triangulated(body.shape, how_, colours);
+    const std::string name = shown(body.name);
+    if (cut.lost_faces > 0)
+      model.warnings.push_back(fmt::format("'{}': {} faces are damaged and left out", name, cut.lost_faces));
+    if (cut.mesh.pieces.empty()) return std::nullopt;
+    if (cut.open_edges > 0)
+      model.warnings.push_back(
+          fmt::format("'{}': the surface does not close ({} open edges)", name, cut.open_edges));
+    if (cut.mesh.chord_error_mm > how_.chord_mm)
+      model.warnings.push_back(
+          fmt::format("'{}': the chord error is {:.2g} mm", name, cut.mesh.chord_error_mm));
+    model.meshes.push_back(std::move(cut.mesh));
+    return model.meshes.size() - 1;
+  }
+
+  const fs::path& path_;
+  const OcctDocument& document_;
+  const Tessellation& how_;
+  std::map<std::string, Named> meshes_of_;
+  std::size_t triangles_ = 0;
+};
+
+}  // namespace
+
+Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, ProgressLines* progress) {
+  LIMN_TRY(const OcctDocument document, read_document(path, progress));
+  progress->begin_stage("cutting into triangles", k_translated_percent, k_cut_percent);
+  Leaves leaves = leaves_of(document.document);
+  Builder builder(path, document, how);
+  builder.model.warnings = document.warnings;
+  if (document.format == "IGES") {
+    const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), is_whole);
+    builder.add_loose({loose, leaves.all.end()});
+    leaves.all.erase(loose, leaves.all.end());
+    LIMN_TRY_STATUS(builder.check_count(1));
+  }
+  for (std::size_t i = 0; i < leaves.all.size(); ++i) {
+    const double share = static_cast<double>(i + 1) / static_cast<double>(leaves.all.size());
+    LIMN_TRY_STATUS(builder.add(leaves.all[i], share));
+    progress->advance(share);
+  }
+  CadModel model = std::move(builder.model);
+  if (leaves.hidden > 0)
+    model.warnings.push_back(fmt::format("{} hidden shapes are left out", leaves.hidden));
+  if (model.nodes.empty())
+    return error(
+        "{}: expected a {} file with surfaces, found only points, curves and hidden shapes. Export solids or "
+        "surfaces.",
+        path.string(), document.format);
+  model.format = document.format;
+  model.schema = document.schema;
+  model.unit = document.unit;
+  model.metres_per_unit = document.metres_per_unit;
+  LIMN_TRY(model.sources, sources_of(path, document.other_files));
+  return model;
+}
+
+}  // namespace limn::cad

@@ -1,0 +1,239 @@
+#include "exchange/cad/triangles.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <opencascade/BRepAdaptor_Curve.hxx>
+#include <opencascade/BRepAdaptor_Surface.hxx>
+#include <opencascade/BRepLProp_SLProps.hxx>
+#include <opencascade/BRepMesh_IncrementalMesh.hxx>
+#include <opencascade/BRepTools.hxx>
+#include <opencascade/BRep_Tool.hxx>
+#include <opencascade/Poly_PolygonOnTriangulation.hxx>
+#include <opencascade/Poly_Triangulation.hxx>
+#include <opencascade/TopExp.hxx>
+#include <opencascade/TopExp_Explorer.hxx>
+#include <opencascade/TopTools_IndexedDataMapOfShapeListOfShape.hxx>
+#include <opencascade/TopTools_ListOfShape.hxx>
+#include <opencascade/TopoDS.hxx>
+
+namespace limn::cad {
+namespace {
+
+constexpr double k_metres = 1e-3;      // the document's shapes are in millimetres
+constexpr int k_most_samples = 20000;  // triangles of a shape on which the chord error is measured
+constexpr int k_most_tries = 4;
+constexpr double k_safety = 0.9, k_finest = 0.05;  // shares of the wanted chord error
+
+Eigen::Vector3d vector_of(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
+
+// A face with its triangles.
+struct Cut {
+  TopoDS_Face face;
+  Handle(Poly_Triangulation) triangles;
+  gp_Trsf placed;
+};
+
+std::vector<Cut> cuts_of(const TopoDS_Shape& shape, int* lost_faces) {
+  std::vector<Cut> cuts;
+  *lost_faces = 0;
+  for (TopExp_Explorer at(shape, TopAbs_FACE); at.More(); at.Next()) {
+    TopLoc_Location place;
+    const TopoDS_Face& face = TopoDS::Face(at.Current());
+    const Handle(Poly_Triangulation)& triangles = BRep_Tool::Triangulation(face, place);
+    if (triangles.IsNull() || triangles->NbTriangles() == 0)
+      ++*lost_faces;
+    else
+      cuts.push_back({face, triangles, place.Transformation()});
+  }
+  return cuts;
+}
+
+void cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
+  IMeshTools_Parameters parameters;
+  parameters.Deflection = chord_mm;
+  parameters.Angle = angle_deg * M_PI / 180;
+  parameters.AngleInterior = parameters.Angle;
+  // Shorter sides would follow kinks that are smaller than the chord error, in some files without end.
+  parameters.MinSize = chord_mm;
+  parameters.InParallel = Standard_False;  // a session needs the other cores for its frames
+  BRepTools::Clean(shape);
+  const BRepMesh_IncrementalMesh mesher(shape, parameters);
+}
+
+// ---- the chord error
+
+// The largest distance of surface points from the triangles between whose corners they are, mm: at the
+// middles of triangles and of their sides. Every `step`th triangle is measured.
+double surface_error_mm(const Cut& cut, int step) {
+  const BRepAdaptor_Surface surface(cut.face, Standard_False);
+  if (surface.GetType() == GeomAbs_Plane || !cut.triangles->HasUVNodes()) return 0;
+  double worst = 0;
+  for (int t = 1; t <= cut.triangles->NbTriangles(); t += step) {
+    const Poly_Triangle& triangle = cut.triangles->Triangle(t);
+    Eigen::Vector3d p[3];
+    gp_XY uv[3];
+    for (int k = 0; k < 3; ++k) {
+      const int node = triangle.Value(k + 1);
+      p[k] = vector_of(cut.triangles->Node(node).Transformed(cut.placed).XYZ());
+      uv[k] = cut.triangles->UVNode(node).XY();
+    }
+    const Eigen::Vector3d d_normal = (p[1] - p[0]).cross(p[2] - p[0]);
+    if (!(d_normal.norm() > 1e-12)) continue;
+    const gp_XY middles[4] = {(uv[0] + uv[1] + uv[2]) / 3, (uv[0] + uv[1]) / 2, (uv[1] + uv[2]) / 2,
+                              (uv[2] + uv[0]) / 2};
+    for (const gp_XY& middle : middles) {
+      const Eigen::Vector3d on_surface = vector_of(surface.Value(middle.X(), middle.Y()).XYZ());
+      worst = std::max(worst, std::abs((on_surface - p[0]).dot(d_normal.normalized())));
+    }
+  }
+  return worst;
+}
+
+// The same for a face's edges and the sides of triangles along them.
+double edge_error_mm(const Cut& cut) {
+  double worst = 0;
+  for (TopExp_Explorer at(cut.face, TopAbs_EDGE); at.More(); at.Next()) {
+    const TopoDS_Edge& edge = TopoDS::Edge(at.Current());
+    TopLoc_Location place;
+    const Handle(Poly_Triangulation)& triangles = BRep_Tool::Triangulation(cut.face, place);
+    const Handle(Poly_PolygonOnTriangulation)& line =
+        BRep_Tool::PolygonOnTriangulation(edge, triangles, place);
+    if (line.IsNull() || !line->HasParameters() || BRep_Tool::Degenerated(edge)) continue;
+    const BRepAdaptor_Curve curve(edge);
+    if (curve.GetType() == GeomAbs_Line) continue;
+    for (int i = 1; i < line->NbNodes(); ++i) {
+      const gp_Pnt a = triangles->Node(line->Node(i)).Transformed(cut.placed),
+                   b = triangles->Node(line->Node(i + 1)).Transformed(cut.placed);
+      const Eigen::Vector3d from = vector_of(a.XYZ()), along = vector_of(b.XYZ()) - from;
+      const Eigen::Vector3d middle =
+          vector_of(curve.Value((line->Parameter(i) + line->Parameter(i + 1)) / 2).XYZ()) - from;
+      const double length = along.norm();
+      if (length > 1e-9) worst = std::max(worst, middle.cross(along).norm() / length);
+    }
+  }
+  return worst;
+}
+
+double chord_error_mm(const std::vector<Cut>& cuts) {
+  int count = 0;
+  for (const Cut& cut : cuts) count += cut.triangles->NbTriangles();
+  double worst = 0;
+  for (const Cut& cut : cuts)
+    worst = std::max({worst, surface_error_mm(cut, 1 + count / k_most_samples), edge_error_mm(cut)});
+  return worst;
+}
+
+// ---- triangles
+
+// The normals of the surface at a face's nodes. Where it has none, as at a pole or at the tip of a cone, the
+// normal a little inside the face; zero where there is none either.
+std::vector<Eigen::Vector3f> normals_of(const Cut& cut) {
+  BRepAdaptor_Surface surface(cut.face, Standard_False);
+  BRepLProp_SLProps at(surface, 1, 1e-12);
+  std::vector<Eigen::Vector3f> normals(static_cast<std::size_t>(cut.triangles->NbNodes()),
+                                       Eigen::Vector3f::Zero());
+  if (!cut.triangles->HasUVNodes()) return normals;
+  constexpr double k_inside = 1e-3;  // a share: 1 is the middle of the face
+  gp_XY middle(0, 0);
+  for (int node = 1; node <= cut.triangles->NbNodes(); ++node)
+    middle += cut.triangles->UVNode(node).XY() / cut.triangles->NbNodes();
+  const float side = cut.face.Orientation() == TopAbs_REVERSED ? -1.F : 1.F;
+  for (int node = 1; node <= cut.triangles->NbNodes(); ++node) {
+    gp_XY uv = cut.triangles->UVNode(node).XY();
+    at.SetParameters(uv.X(), uv.Y());
+    if (!at.IsNormalDefined()) {
+      uv += k_inside * (middle - uv);
+      at.SetParameters(uv.X(), uv.Y());
+    }
+    if (at.IsNormalDefined())
+      normals[static_cast<std::size_t>(node) - 1] = side * vector_of(at.Normal().XYZ()).cast<float>();
+  }
+  return normals;
+}
+
+void append(const Cut& cut, CadPiece* piece) {
+  const auto first = static_cast<std::uint32_t>(piece->positions.size());
+  for (int node = 1; node <= cut.triangles->NbNodes(); ++node)
+    piece->positions.push_back(
+        (k_metres * vector_of(cut.triangles->Node(node).Transformed(cut.placed).XYZ())).cast<float>());
+  std::vector<Eigen::Vector3f> normals = normals_of(cut);
+  const bool turned = (cut.face.Orientation() == TopAbs_REVERSED) != cut.placed.IsNegative();
+  std::vector<Eigen::Vector3f> sums(normals.size(), Eigen::Vector3f::Zero());
+  for (int t = 1; t <= cut.triangles->NbTriangles(); ++t) {
+    int a = 0, b = 0, c = 0;
+    cut.triangles->Triangle(t).Get(a, b, c);
+    if (turned) std::swap(b, c);
+    std::array<std::uint32_t, 3> corners{};
+    for (std::size_t k = 0; k < 3; ++k)
+      corners[k] = first + static_cast<std::uint32_t>(std::array{a, b, c}[k]) - 1;
+    const Eigen::Vector3f &p = piece->positions[corners[0]], &q = piece->positions[corners[1]],
+                          &r = piece->positions[corners[2]];
+    for (const std::uint32_t corner : corners) sums[corner - first] += (q - p).cross(r - p);
+    piece->triangles.push_back(corners);
+  }
+  for (std::size_t i = 0; i < normals.size(); ++i) {
+    if (normals[i].isZero()) normals[i] = sums[i];
+    piece->normals.push_back(normals[i].squaredNorm() > 0 ? normals[i].normalized().eval()
+                                                          : Eigen::Vector3f::UnitZ().eval());
+  }
+}
+
+// Turns a closed surface whose inside is outside.
+void face_outwards(CadMesh* mesh) {
+  double volume = 0;  // six times
+  for (const CadPiece& piece : mesh->pieces)
+    for (const auto& [a, b, c] : piece.triangles)
+      volume += piece.positions[a].cast<double>().dot(
+          piece.positions[b].cast<double>().cross(piece.positions[c].cast<double>()));
+  if (volume >= 0) return;
+  for (CadPiece& piece : mesh->pieces) {
+    for (auto& triangle : piece.triangles) std::swap(triangle[1], triangle[2]);
+    for (Eigen::Vector3f& normal : piece.normals) normal = -normal;
+  }
+}
+
+int count_open_edges(const TopoDS_Shape& shape) {
+  TopTools_IndexedDataMapOfShapeListOfShape faces;
+  TopExp::MapShapesAndAncestors(shape, TopAbs_EDGE, TopAbs_FACE, faces);
+  int open = 0;
+  for (int i = 1; i <= faces.Extent(); ++i) {
+    const TopoDS_Edge& edge = TopoDS::Edge(faces.FindKey(i));
+    if (faces.FindFromIndex(i).Extent() != 1 || BRep_Tool::Degenerated(edge)) continue;
+    if (!BRep_Tool::IsClosed(edge, TopoDS::Face(faces.FindFromIndex(i).First()))) ++open;  // not a seam
+  }
+  return open;
+}
+
+}  // namespace
+
+Triangulated triangulated(const TopoDS_Shape& shape,
+                          const Tessellation& how,
+                          const std::function<Colour(const TopoDS_Face&)>& colour_of) {
+  Triangulated out;
+  std::vector<Cut> cuts;
+  double chord_mm = how.chord_mm;
+  for (int tried = 1; tried <= k_most_tries; ++tried) {
+    cut_shape(shape, chord_mm, how.angle_deg);
+    cuts = cuts_of(shape, &out.lost_faces);
+    out.mesh.chord_error_mm = chord_error_mm(cuts);
+    if (out.mesh.chord_error_mm <= how.chord_mm) break;
+    chord_mm = std::max(k_finest * how.chord_mm,
+                        chord_mm * std::min(k_safety, k_safety * how.chord_mm / out.mesh.chord_error_mm));
+  }
+  std::map<Colour, std::size_t> piece_of;
+  for (const Cut& cut : cuts) {
+    const Colour colour = colour_of(cut.face);
+    const auto [known, is_new] = piece_of.try_emplace(colour, out.mesh.pieces.size());
+    if (is_new) out.mesh.pieces.push_back({.colour = colour});
+    append(cut, &out.mesh.pieces[known->second]);
+  }
+  out.open_edges = count_open_edges(shape);
+  out.mesh.is_closed = out.open_edges == 0;
+  if (out.mesh.is_closed) face_outwards(&out.mesh);
+  BRepTools::Clean(shape);
+  return out;
+}
+
+}  // namespace limn::cad

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <functional>
+#include <opencascade/TopoDS_Face.hxx>
+#include <opencascade/TopoDS_Shape.hxx>
+
+#include "core/result.h"
+#include "exchange/cad/cad_model.h"
+
+namespace limn::cad {
+
+/// Cuts a shape's surfaces into triangles. The chord error is measured on the surfaces and their edges; where
+/// it is larger than wanted, the shape is cut again, finer. `colour_of` gives the colour of each face. Faces
+/// that cannot be cut are left out and counted.
+struct Triangulated {
+  CadMesh mesh;
+  int lost_faces = 0;
+  int open_edges = 0;  ///< Edges with a surface on one side only.
+};
+Triangulated triangulated(const TopoDS_Shape& shape,
+                          const Tessellation& how,
+                          const std::function<Colour(const TopoDS_Face&)>& colour_of);
+
+}  // namespace limn::cad
