@@ -1,5 +1,6 @@
-// limn-cad: reads a STEP or IGES file with OpenCASCADE and writes its surfaces as GLB. It is a program of its
-// own, because OpenCASCADE is large, and because it may crash or never end on a damaged file.
+// limn-cad: reads a STEP or IGES file with OpenCASCADE and writes its surfaces as GLB; reads and writes
+// curves. It is a program of its own, because OpenCASCADE is large, and because it may crash or never end on
+// a damaged file.
 #include <fcntl.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -20,24 +21,34 @@
 #include <string>
 #include <string_view>
 
+#include "core/file.h"
 #include "core/json_text.h"
 #include "exchange/cad/cad_output.h"
 #include "exchange/cad/read_cad_model.h"
+#include "exchange/cad/read_curves.h"
+#include "exchange/cad/write_curves.h"
+#include "exchange/curves/curve_list.h"
 
 namespace limn::cad {
 namespace {
 
 constexpr const char* k_help =
     "Usage: limn-cad FILE --out OUT [--as part|parts|variants] [--chord-mm 0.1] [--angle-deg 20] [--json]\n"
-    "                [--most-triangles N] [--progress] [--memory-mb N]\n\n"
+    "                [--most-triangles N] [--progress] [--memory-mb N]\n"
+    "       limn-cad FILE --curves [--edges] [--chord-mm 0.01]\n"
+    "       limn-cad CURVES.json --out OUT.step\n\n"
     "Reads a STEP or IGES file and writes its surfaces as triangles (GLB, in metres). `limn` starts this\n"
-    "program by itself wherever it reads such a file; `limn import cad --help` says more.\n\n"
+    "program by itself wherever it reads such a file; `limn import cad --help` says more.\n"
+    "With --curves it prints the file's curves as points (limn.curves/1); such a list becomes a STEP "
+    "file.\n\n"
     "  --out OUT          File to write, such as door.glb; for parts and variants a folder\n"
     "  --as WORD          part: one file; parts: one for each solid at each place; variants: one for each "
     "solid\n"
     "  --chord-mm MM      Largest distance between surfaces and triangles\n"
     "  --angle-deg DEG    Largest angle between the normals at the ends of a triangle's side\n"
     "  --most-triangles N Refuse a file of more (10000000)\n"
+    "  --curves           Print the curves that bound no surface instead\n"
+    "  --edges            Also the edges of surfaces\n"
     "  --json             Print the report limn.cad/1 instead of lines\n"
     "  --progress         Print lines \"progress PERCENT WHAT\" first\n"
     "  --memory-mb N      Take at most so much memory\n";
@@ -49,7 +60,8 @@ struct Options {
   std::filesystem::path file, out;
   TakenAs as = TakenAs::part;
   Tessellation how;
-  bool json = false, progress = false, help = false;
+  std::optional<double> chord_mm = {};  // as given
+  bool curves = false, edges = false, json = false, progress = false, help = false;
   double memory_mb = 0;  // 0: no limit
 };
 
@@ -70,7 +82,12 @@ Status read_value(const std::string& option, const std::string& value, Options* 
     options->as = *as;
     return {};
   }
-  if (option == "--chord-mm") return read_number(option, value, 1e-4, 1000, &options->how.chord_mm);
+  if (option == "--chord-mm") {
+    double chord_mm = 0;
+    LIMN_TRY_STATUS(read_number(option, value, 1e-4, 1000, &chord_mm));
+    options->chord_mm = options->how.chord_mm = chord_mm;
+    return {};
+  }
   if (option == "--angle-deg") return read_number(option, value, 1, 90, &options->how.angle_deg);
   if (option == "--most-triangles") {
     double most = 0;
@@ -92,6 +109,10 @@ Result<Options> read_options(const std::vector<std::string>& words) {
     }
     if (word == "--json") {
       options.json = true;
+    } else if (word == "--curves") {
+      options.curves = true;
+    } else if (word == "--edges") {
+      options.edges = true;
     } else if (word == "--progress") {
       options.progress = true;
     } else if (!word.starts_with("--")) {
@@ -102,7 +123,7 @@ Result<Options> read_options(const std::vector<std::string>& words) {
       LIMN_TRY_STATUS(read_value(word, words[++i], &options));
     }
   }
-  if (options.file.empty() || options.out.empty())
+  if (options.file.empty() || (options.out.empty() && !options.curves))
     return usage_error(
         "expected a STEP or IGES file and --out (limn-cad --help), found neither or one of them.");
   return options;
@@ -148,10 +169,35 @@ struct Problem {
   int code;
 };
 
+Problem no_results() {
+  return {"standard output: expected to write the results, found it closed or full.", k_not_written};
+}
+
+std::optional<Problem> print_curves(const Options& options, int results, ProgressLines* progress) {
+  CurveSampling how{.with_edges = options.edges};
+  if (options.chord_mm) how.chord_mm = *options.chord_mm;
+  const auto list = read_curves(options.file, how, progress);
+  if (!list) return Problem{list.message(), k_wrong_file};
+  if (!write_all(results, exchange::encode_curve_list(*list) + "\n")) return no_results();
+  return std::nullopt;
+}
+
+std::optional<Problem> write_list(const Options& options, ProgressLines* progress) {
+  const auto text = read_file(options.file);
+  if (!text) return Problem{text.message(), k_wrong_file};
+  const auto list = exchange::decode_curve_list(*text, options.file.string());
+  if (!list) return Problem{list.message(), k_wrong_file};
+  const Status written = write_curves(*list, options.out, progress);
+  if (!written) return Problem{written.message(), k_not_written};
+  return std::nullopt;
+}
+
 std::optional<Problem> run(const Options& options, int results) {
   Message::DefaultMessenger()->ChangePrinters().Clear();
   XCAFDoc_ShapeTool::SetAutoNaming(Standard_False);
   const Handle(ProgressLines) progress = new ProgressLines(options.progress ? results : -1);
+  if (options.curves) return print_curves(options, results, progress.get());
+  if (options.file.extension() == ".json") return write_list(options, progress.get());
   const auto model = read_cad_model(options.file, options.how, progress.get());
   if (!model) return Problem{model.message(), k_wrong_file};
   progress->begin_stage("writing", 95, 100);
@@ -161,7 +207,7 @@ std::optional<Problem> run(const Options& options, int results) {
   for (const std::string& warning : model->warnings)
     if (!options.json) std::cerr << "limn-cad: warning: " << warning << '\n';
   if (!write_all(results, options.json ? json_text(report) + "\n" : sentences_of(report)))
-    return Problem{"standard output: expected to write the results, found it closed or full.", k_not_written};
+    return no_results();
   return std::nullopt;
 }
 

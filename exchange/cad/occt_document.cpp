@@ -1,5 +1,7 @@
 #include "exchange/cad/occt_document.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -15,8 +17,11 @@
 #include <opencascade/StepBasic_ProductDefinition.hxx>
 #include <opencascade/StepBasic_ProductDefinitionFormation.hxx>
 #include <opencascade/StepData_StepModel.hxx>
+#include <opencascade/StepData_UndefinedEntity.hxx>
+#include <opencascade/StepGeom_Curve.hxx>
 #include <opencascade/StepRepr_NextAssemblyUsageOccurrence.hxx>
 #include <opencascade/StepRepr_RepresentationItem.hxx>
+#include <opencascade/StepShape_EdgeCurve.hxx>
 #include <opencascade/StepShape_ManifoldSolidBrep.hxx>
 #include <opencascade/StepShape_ShellBasedSurfaceModel.hxx>
 #include <opencascade/TColStd_SequenceOfAsciiString.hxx>
@@ -28,6 +33,7 @@
 #include <opencascade/XSControl_TransferReader.hxx>
 #include <opencascade/XSControl_WorkSession.hxx>
 #include <set>
+#include <utility>
 
 #include "core/utf8.h"
 
@@ -45,12 +51,6 @@ std::string text_of(const Handle(TCollection_HAsciiString) & text) {
 std::string lower(std::string text) {
   std::transform(text.begin(), text.end(), text.begin(), [](unsigned char c) { return std::tolower(c); });
   return text;
-}
-
-Handle(TDocStd_Document) new_document() {
-  Handle(TDocStd_Document) document;
-  XCAFApp_Application::GetApplication()->NewDocument("BinXCAF", document);
-  return document;
 }
 
 Error damaged(const fs::path& path, const std::string& format, const std::string& found) {
@@ -147,15 +147,39 @@ std::string circle_in(const Handle(StepData_StepModel) & model) {
   return "";
 }
 
-// Names of the STEP entities that became solids or surface models.
-void read_solid_names(const Handle(XSControl_WorkSession) & session,
+// What a file may have instead of solids by their boundaries, by a part of the types' names.
+constexpr std::pair<const char*, const char*> k_unread[] = {
+    {"tessellatedsolid", "meshes (tessellated geometry)"},
+    {"tessellatedshell", "meshes (tessellated geometry)"},
+    {"csg", "CSG solids"},
+    {"booleanresult", "CSG solids"},
+    {"sweptarea", "swept areas"},
+    {"extrudedarea", "swept areas"},
+    {"revolvedarea", "swept areas"},
+    {"sweptdisk", "swept areas"}};
+
+std::string unread_shapes(const Handle(StepData_StepModel) & model) {
+  std::set<std::string> found;
+  for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
+    const auto unknown = Handle(StepData_UndefinedEntity)::DownCast(model->Value(i));
+    std::string type = lower(unknown.IsNull() ? model->Value(i)->DynamicType()->Name() : unknown->StepType());
+    std::erase(type, '_');
+    for (const auto& [part, name] : k_unread)
+      if (type.find(part) != std::string::npos) found.insert(name);
+  }
+  return fmt::format("{}", fmt::join(found, ", "));
+}
+
+// Names of the STEP entities that became solids, surface models or curves.
+void read_shape_names(const Handle(XSControl_WorkSession) & session,
                       const Handle(StepData_StepModel) & model,
-                      SolidNames* names) {
+                      ShapeNames* names) {
   const Handle(Transfer_TransientProcess) process = session->TransferReader()->TransientProcess();
   for (Standard_Integer i = 1; i <= model->NbEntities(); ++i) {
     const Handle(Standard_Transient) entity = model->Value(i);
     if (!entity->IsKind(STANDARD_TYPE(StepShape_ManifoldSolidBrep)) &&
-        !entity->IsKind(STANDARD_TYPE(StepShape_ShellBasedSurfaceModel)))
+        !entity->IsKind(STANDARD_TYPE(StepShape_ShellBasedSurfaceModel)) &&
+        !entity->IsKind(STANDARD_TYPE(StepGeom_Curve)) && !entity->IsKind(STANDARD_TYPE(StepShape_EdgeCurve)))
       continue;
     const TopoDS_Shape shape = TransferBRep::ShapeResult(process, entity);
     const std::string name = text_of(Handle(StepRepr_RepresentationItem)::DownCast(entity)->Name());
@@ -181,8 +205,10 @@ Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
     return error("{}: expected an assembly that does not contain itself, found {}. Remove one of these uses.",
                  path.string(), circle);
   progress->begin_stage("translating", k_read_percent, k_transferred_percent);
-  if (!reader.Transfer(out.document, progress->Start())) return damaged(path, "STEP", "no shapes");
-  read_solid_names(reader.ChangeReader().WS(), model, &out.solid_names);
+  out.unread = unread_shapes(model);
+  if (!reader.Transfer(out.document, progress->Start()) && out.unread.empty())
+    return damaged(path, "STEP", "no shapes");
+  read_shape_names(reader.ChangeReader().WS(), model, &out.shape_names);
   NCollection_DataMap<TCollection_AsciiString, Handle(STEPCAFControl_ExternFile)>::Iterator other(
       reader.ExternFiles());
   for (; other.More(); other.Next()) out.other_files.emplace_back(other.Key().ToCString());
@@ -226,6 +252,12 @@ Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
 }
 
 }  // namespace
+
+Handle(TDocStd_Document) new_document() {
+  Handle(TDocStd_Document) document;
+  XCAFApp_Application::GetApplication()->NewDocument("BinXCAF", document);
+  return document;
+}
 
 Result<OcctDocument> read_document(const fs::path& path, ProgressLines* progress) {
   const std::string end = lower(path.extension().string());

@@ -13,7 +13,8 @@
 
 namespace limn::cad {
 
-using SolidNames = NCollection_DataMap<TopoDS_Shape, std::string, TopTools_ShapeMapHasher>;
+/// The names of single shapes of a product: solids, surface models, curves.
+using ShapeNames = NCollection_DataMap<TopoDS_Shape, std::string, TopTools_ShapeMapHasher>;
 
 /// A CAD file in OpenCASCADE's document (XDE), whose shapes are in millimetres, with what the document does
 /// not keep.
@@ -22,9 +23,13 @@ struct OcctDocument {
   std::string format = {}, schema = {}, unit = {};  ///< As CadModel's.
   double metres_per_unit = 1e-3;
   std::vector<std::string> other_files = {};  ///< STEP files that it refers to, relative to its folder.
-  SolidNames solid_names = {};                ///< The document itself names only products.
+  ShapeNames shape_names = {};                ///< The document itself names only products.
+  std::string unread = {};                    ///< Kinds of shapes that are in the file but are not read.
   std::vector<std::string> warnings = {};
 };
+
+/// An empty document.
+Handle(TDocStd_Document) new_document();
 
 /// Reads a STEP or IGES file, in the format that its name ends in. Errors: not readable, damaged, without
 /// shapes, an assembly that contains itself.

@@ -5,21 +5,17 @@
 #include <map>
 #include <opencascade/BRepBuilderAPI_Sewing.hxx>
 #include <opencascade/BRep_Builder.hxx>
-#include <opencascade/TDF_Label.hxx>
-#include <opencascade/TDF_Tool.hxx>
-#include <opencascade/TDataStd_Name.hxx>
 #include <opencascade/TopExp_Explorer.hxx>
 #include <opencascade/TopoDS.hxx>
 #include <opencascade/TopoDS_Compound.hxx>
-#include <opencascade/XCAFDoc_ColorTool.hxx>
-#include <opencascade/XCAFDoc_DocumentTool.hxx>
+#include <opencascade/TopoDS_Iterator.hxx>
 #include <opencascade/XCAFDoc_ShapeTool.hxx>
 #include <opencascade/XCAFPrs.hxx>
-#include <opencascade/XCAFPrs_DocumentExplorer.hxx>
 #include <optional>
 
 #include "core/file.h"
 #include "core/utf8.h"
+#include "exchange/cad/leaves.h"
 #include "exchange/cad/occt_document.h"
 #include "exchange/cad/triangles.h"
 #include "scene/fingerprint.h"
@@ -29,37 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr float k_no_colour = 0.6F;  // as meshes that state none
 constexpr double k_translated_percent = 60, k_cut_percent = 95;
-
-Colour colour_of(const XCAFPrs_Style& style) {
-  if (!style.IsSetColorSurf()) return {k_no_colour, k_no_colour, k_no_colour, 1};
-  const Quantity_ColorRGBA& stated = style.GetColorSurfRGBA();  // linear
-  const Quantity_Color& rgb = stated.GetRGB();
-  return {static_cast<float>(rgb.Red()), static_cast<float>(rgb.Green()), static_cast<float>(rgb.Blue()),
-          stated.Alpha()};
-}
-
-std::string name_of(const TDF_Label& label) {
-  Handle(TDataStd_Name) name;
-  if (label.IsNull() || !label.FindAttribute(TDataStd_Name::GetID(), name)) return "";
-  const TCollection_ExtendedString& wide = name->Get();
-  std::string text(static_cast<std::size_t>(wide.LengthOfCString()) + 1, '\0');
-  char* begin = text.data();
-  wide.ToUTF8CString(begin);
-  text.resize(text.find('\0'));
-  return as_utf8(text);
-}
-
-// A product at one place.
-struct Leaf {
-  TDF_Label product = {};
-  std::string name = {}, key = {};  // two leaves with the same key look the same
-  std::vector<std::string> path = {};
-  gp_Trsf placed = {};
-  XCAFPrs_Style style = {};          // for faces without a colour of their own
-  std::optional<Colour> whole = {};  // the colour of this place, which replaces all others
-};
 
 Eigen::Matrix4d matrix_of(const gp_Trsf& placed) {
   Eigen::Matrix4d m = Eigen::Matrix4d::Identity();
@@ -68,55 +34,6 @@ Eigen::Matrix4d matrix_of(const gp_Trsf& placed) {
     m(row, 3) = 1e-3 * placed.Value(row + 1, 4);
   }
   return m;
-}
-
-// The colour that an instance states for itself.
-std::optional<Colour> own_colour(const Handle(XCAFDoc_ColorTool) & colours, const TDF_Label& instance) {
-  Quantity_ColorRGBA colour;
-  for (const XCAFDoc_ColorType type : {XCAFDoc_ColorSurf, XCAFDoc_ColorGen}) {
-    if (!colours->GetColor(instance, type, colour)) continue;
-    XCAFPrs_Style style;
-    style.SetColorSurf(colour);
-    return colour_of(style);
-  }
-  return std::nullopt;
-}
-
-struct Leaves {
-  std::vector<Leaf> all;
-  int hidden = 0;
-};
-
-Leaves leaves_of(const Handle(TDocStd_Document) & document) {
-  Leaves leaves;
-  const Handle(XCAFDoc_ColorTool) colours = XCAFDoc_DocumentTool::ColorTool(document->Main());
-  for (XCAFPrs_DocumentExplorer at(document, XCAFPrs_DocumentExplorerFlags_OnlyLeafNodes); at.More();
-       at.Next()) {
-    const XCAFPrs_DocumentNode& node = at.Current();
-    if (!node.Style.IsVisible()) {
-      ++leaves.hidden;
-      continue;
-    }
-    Leaf leaf{.product = node.RefLabel, .name = name_of(node.RefLabel)};
-    if (leaf.name.empty()) leaf.name = name_of(node.Label);
-    for (int depth = 0; depth < at.CurrentDepth(); ++depth)
-      leaf.path.push_back(name_of(at.Current(depth).RefLabel));
-    // Some files have a nameless product for the shape inside a named one.
-    while (leaf.name.empty() && !leaf.path.empty()) {
-      leaf.name = leaf.path.back();
-      leaf.path.pop_back();
-    }
-    leaf.placed = node.Location.Transformation();
-    leaf.style = node.Style;
-    if (node.Label != node.RefLabel) leaf.whole = own_colour(colours, node.Label);
-    TCollection_AsciiString entry;
-    TDF_Tool::Entry(node.RefLabel, entry);
-    leaf.key = entry.ToCString();
-    const Colour colour = leaf.whole ? *leaf.whole : colour_of(leaf.style);
-    leaf.key += fmt::format("{}{}", leaf.whole.has_value(), fmt::join(colour, " "));
-    leaves.all.push_back(std::move(leaf));
-  }
-  return leaves;
 }
 
 // The colours of a product's faces.
@@ -152,21 +69,32 @@ struct Body {
   std::string name;
 };
 
-std::vector<Body> bodies_of(const Leaf& leaf, const SolidNames& names) {
+// The bodies inside a shape; faces that belong to none of them go to `rest`.
+void add_bodies(const TopoDS_Shape& shape,
+                const ShapeNames& names,
+                std::vector<Body>* bodies,
+                TopoDS_Compound* rest) {
+  const std::string* name = names.Seek(shape.Located(TopLoc_Location()));
+  const bool is_solid = shape.ShapeType() == TopAbs_SOLID;
+  const bool is_surface = shape.ShapeType() < TopAbs_FACE && name &&
+                          !TopExp_Explorer(shape, TopAbs_SOLID).More() &&
+                          TopExp_Explorer(shape, TopAbs_FACE).More();
+  if (is_solid || is_surface)
+    bodies->push_back({shape, name ? *name : ""});
+  else if (shape.ShapeType() == TopAbs_FACE)
+    BRep_Builder().Add(*rest, shape);
+  else if (shape.ShapeType() < TopAbs_FACE)
+    for (TopoDS_Iterator at(shape); at.More(); at.Next()) add_bodies(at.Value(), names, bodies, rest);
+}
+
+std::vector<Body> bodies_of(const Leaf& leaf, const ShapeNames& names) {
   const TopoDS_Shape product = XCAFDoc_ShapeTool::GetShape(leaf.product);
   std::vector<Body> bodies;
   if (product.IsNull()) return bodies;
-  for (TopExp_Explorer at(product, TopAbs_SOLID); at.More(); at.Next()) {
-    const std::string* name = names.Seek(at.Current().Located(TopLoc_Location()));
-    bodies.push_back({at.Current(), name ? *name : ""});
-  }
   TopoDS_Compound rest;
-  const BRep_Builder builder;
-  builder.MakeCompound(rest);
-  int loose_faces = 0;
-  for (TopExp_Explorer at(product, TopAbs_FACE, TopAbs_SOLID); at.More(); at.Next(), ++loose_faces)
-    builder.Add(rest, at.Current());
-  if (loose_faces > 0) bodies.push_back({rest, ""});
+  BRep_Builder().MakeCompound(rest);
+  add_bodies(product, names, &bodies, &rest);
+  if (TopoDS_Iterator(rest).More()) bodies.push_back({rest, ""});
   // The product's name is what people know; the names of its solids matter where there are several.
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     if (bodies.size() == 1 && !leaf.name.empty())
@@ -277,17 +205,24 @@ class Builder {
     if (const auto mesh = cut_body({whole.shape, name}, whole)) add_node(name, {}, *mesh, gp_Trsf());
   }
 
-  CadModel model;
+  // The model; the builder is empty then.
+  CadModel take_model() {
+    if (open_ > k_most_open)
+      model_.warnings.push_back(fmt::format("{} more surfaces do not close", open_ - k_most_open));
+    return std::move(model_);
+  }
 
  private:
+  static constexpr int k_most_open = 5;  // open surfaces that are named
+
   using Named = std::vector<std::pair<std::string, std::size_t>>;
 
   void add_node(const std::string& name,
                 const std::vector<std::string>& path,
                 std::size_t mesh,
                 const gp_Trsf& placed) {
-    model.nodes.push_back({shown(name), path, mesh, matrix_of(placed)});
-    triangles_ += model.meshes[mesh].triangle_count();
+    model_.nodes.push_back({shown(name), path, mesh, matrix_of(placed)});
+    triangles_ += model_.meshes[mesh].triangle_count();
   }
 
   std::string shown(const std::string& name) const {
@@ -299,7 +234,7 @@ class Builder {
     const bool has_solid = TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
     if (document_.format == "IGES" && !has_solid) return cut_group(leaf);
     const FaceColours colours(leaf);
-    for (const Body& body : bodies_of(leaf, document_.solid_names))
+    for (const Body& body : bodies_of(leaf, document_.shape_names))
       if (const auto mesh = cut_body(body, [&](const TopoDS_Face& face) { return colours(face); }))
         named.emplace_back(body.name, *mesh);
     return named;
@@ -320,16 +255,17 @@ class Builder {
     Triangulated cut = triangulated(body.shape, how_, colours);
     const std::string name = shown(body.name);
     if (cut.lost_faces > 0)
-      model.warnings.push_back(fmt::format("'{}': {} faces are damaged and left out", name, cut.lost_faces));
+      model_.warnings.push_back(fmt::format("'{}': {} faces are damaged and left out", name, cut.lost_faces));
     if (cut.mesh.pieces.empty()) return std::nullopt;
-    if (cut.open_edges > 0)
-      model.warnings.push_back(
+    if (cut.open_edges > 0 && ++open_ <= k_most_open)
+      model_.warnings.push_back(
           fmt::format("'{}': the surface does not close ({} open edges)", name, cut.open_edges));
     if (cut.mesh.chord_error_mm > how_.chord_mm)
-      model.warnings.push_back(
-          fmt::format("'{}': the chord error is {:.2g} mm", name, cut.mesh.chord_error_mm));
-    model.meshes.push_back(std::move(cut.mesh));
-    return model.meshes.size() - 1;
+      model_.warnings.push_back(
+          fmt::format("'{}': the chord error is {:.2g} mm (larger than {} mm in {} faces)", name,
+                      cut.mesh.chord_error_mm, how_.chord_mm, cut.coarse_faces));
+    model_.meshes.push_back(std::move(cut.mesh));
+    return model_.meshes.size() - 1;
   }
 
   const fs::path& path_;
@@ -337,6 +273,8 @@ class Builder {
   const Tessellation& how_;
   std::map<std::string, Named> meshes_of_;
   std::size_t triangles_ = 0;
+  int open_ = 0;
+  CadModel model_;
 };
 
 }  // namespace
@@ -346,7 +284,6 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
   progress->begin_stage("cutting into triangles", k_translated_percent, k_cut_percent);
   Leaves leaves = leaves_of(document.document);
   Builder builder(path, document, how);
-  builder.model.warnings = document.warnings;
   if (document.format == "IGES") {
     const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), is_whole);
     builder.add_loose({loose, leaves.all.end()});
@@ -358,14 +295,16 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
     LIMN_TRY_STATUS(builder.add(leaves.all[i], share));
     progress->advance(share);
   }
-  CadModel model = std::move(builder.model);
+  CadModel model = builder.take_model();
+  model.warnings.insert(model.warnings.begin(), document.warnings.begin(), document.warnings.end());
   if (leaves.hidden > 0)
     model.warnings.push_back(fmt::format("{} hidden shapes are left out", leaves.hidden));
   if (model.nodes.empty())
     return error(
-        "{}: expected a {} file with surfaces, found only points, curves and hidden shapes. Export solids or "
-        "surfaces.",
-        path.string(), document.format);
+        "{}: expected {} file with surfaces, found only {}. Export solids or surfaces by their boundaries.",
+        path.string(), document.format == "STEP" ? "a STEP" : "an IGES",
+        document.unread.empty() ? "points, curves and hidden shapes" : document.unread);
+  if (!document.unread.empty()) model.warnings.push_back(fmt::format("{} are left out", document.unread));
   model.format = document.format;
   model.schema = document.schema;
   model.unit = document.unit;

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <ctime>
 #include <map>
 #include <opencascade/BRepAdaptor_Curve.hxx>
 #include <opencascade/BRepAdaptor_Surface.hxx>
@@ -10,11 +11,13 @@
 #include <opencascade/BRepMesh_IncrementalMesh.hxx>
 #include <opencascade/BRepTools.hxx>
 #include <opencascade/BRep_Tool.hxx>
+#include <opencascade/Message_ProgressIndicator.hxx>
 #include <opencascade/Poly_PolygonOnTriangulation.hxx>
 #include <opencascade/Poly_Triangulation.hxx>
 #include <opencascade/TopExp.hxx>
 #include <opencascade/TopExp_Explorer.hxx>
 #include <opencascade/TopTools_IndexedDataMapOfShapeListOfShape.hxx>
+#include <opencascade/TopTools_IndexedMapOfShape.hxx>
 #include <opencascade/TopTools_ListOfShape.hxx>
 #include <opencascade/TopoDS.hxx>
 
@@ -23,8 +26,9 @@ namespace {
 
 constexpr double k_metres = 1e-3;      // the document's shapes are in millimetres
 constexpr int k_most_samples = 20000;  // triangles of a shape on which the chord error is measured
-constexpr int k_most_tries = 4;
-constexpr double k_safety = 0.9, k_finest = 0.05;  // shares of the wanted chord error
+constexpr int k_most_tries = 4, k_most_coarser = 6;
+constexpr double k_seconds = 4, k_seconds_a_face = 0.02;  // processor time; nearly all shapes take far less
+constexpr double k_safety = 0.9, k_finest = 0.05;         // shares of the wanted chord error
 
 Eigen::Vector3d vector_of(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
 
@@ -50,7 +54,22 @@ std::vector<Cut> cuts_of(const TopoDS_Shape& shape, int* lost_faces) {
   return cuts;
 }
 
-void cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
+// Ends the work of OpenCASCADE's mesher after some processor time.
+class Deadline : public Message_ProgressIndicator {
+ public:
+  explicit Deadline(double seconds)
+      : end_(std::clock() + static_cast<std::clock_t>(seconds * CLOCKS_PER_SEC)) {}
+  Standard_Boolean UserBreak() override { return std::clock() > end_; }
+
+ protected:
+  void Show(const Message_ProgressScope& /*scope*/, Standard_Boolean /*is_forced*/) override {}
+
+ private:
+  std::clock_t end_;
+};
+
+// Whether the mesher came to its end in time.
+bool cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
   IMeshTools_Parameters parameters;
   parameters.Deflection = chord_mm;
   parameters.Angle = angle_deg * M_PI / 180;
@@ -59,7 +78,21 @@ void cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
   parameters.MinSize = chord_mm;
   parameters.InParallel = Standard_False;  // a session needs the other cores for its frames
   BRepTools::Clean(shape);
-  const BRepMesh_IncrementalMesh mesher(shape, parameters);
+  TopTools_IndexedMapOfShape faces;
+  TopExp::MapShapes(shape, TopAbs_FACE, faces);
+  const Handle(Deadline) deadline = new Deadline(k_seconds + k_seconds_a_face * faces.Extent());
+  const BRepMesh_IncrementalMesh mesher(shape, parameters, deadline->Start());
+  return !deadline->UserBreak();
+}
+
+// Large shapes, and surfaces on which a refinement comes no nearer, need too many triangles for a small chord
+// error: they are cut with a larger one. Whether that was so.
+bool cut_in_time(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
+  constexpr double k_coarser = 8;
+  if (cut_shape(shape, chord_mm, angle_deg)) return false;
+  for (int tried = 1; tried <= k_most_coarser; ++tried)
+    if (cut_shape(shape, chord_mm *= k_coarser, angle_deg)) break;
+  return true;
 }
 
 // ---- the chord error
@@ -116,13 +149,14 @@ double edge_error_mm(const Cut& cut) {
   return worst;
 }
 
-double chord_error_mm(const std::vector<Cut>& cuts) {
+// The largest error of each face.
+std::vector<double> chord_errors_mm(const std::vector<Cut>& cuts) {
   int count = 0;
   for (const Cut& cut : cuts) count += cut.triangles->NbTriangles();
-  double worst = 0;
+  std::vector<double> errors;
   for (const Cut& cut : cuts)
-    worst = std::max({worst, surface_error_mm(cut, 1 + count / k_most_samples), edge_error_mm(cut)});
-  return worst;
+    errors.push_back(std::max(surface_error_mm(cut, 1 + count / k_most_samples), edge_error_mm(cut)));
+  return errors;
 }
 
 // ---- triangles
@@ -215,12 +249,16 @@ Triangulated triangulated(const TopoDS_Shape& shape,
   std::vector<Cut> cuts;
   double chord_mm = how.chord_mm;
   for (int tried = 1; tried <= k_most_tries; ++tried) {
-    cut_shape(shape, chord_mm, how.angle_deg);
+    const bool is_coarse = cut_in_time(shape, chord_mm, how.angle_deg);
     cuts = cuts_of(shape, &out.lost_faces);
-    out.mesh.chord_error_mm = chord_error_mm(cuts);
-    if (out.mesh.chord_error_mm <= how.chord_mm) break;
-    chord_mm = std::max(k_finest * how.chord_mm,
-                        chord_mm * std::min(k_safety, k_safety * how.chord_mm / out.mesh.chord_error_mm));
+    const std::vector<double> errors = chord_errors_mm(cuts);
+    const double worst_mm = errors.empty() ? 0 : *std::max_element(errors.begin(), errors.end());
+    out.mesh.chord_error_mm = worst_mm;
+    out.coarse_faces = static_cast<int>(
+        std::count_if(errors.begin(), errors.end(), [&](double mm) { return mm > how.chord_mm; }));
+    if (worst_mm <= how.chord_mm || is_coarse) break;
+    chord_mm =
+        std::max(k_finest * how.chord_mm, chord_mm * std::min(k_safety, k_safety * how.chord_mm / worst_mm));
   }
   std::map<Colour, std::size_t> piece_of;
   for (const Cut& cut : cuts) {

@@ -15,7 +15,8 @@ namespace limn::cad {
 struct Triangulated {
   CadMesh mesh;
   int lost_faces = 0;
-  int open_edges = 0;  ///< Edges with a surface on one side only.
+  int coarse_faces = 0;  ///< Faces whose chord error is larger than wanted.
+  int open_edges = 0;    ///< Edges with a surface on one side only.
 };
 Triangulated triangulated(const TopoDS_Shape& shape,
                           const Tessellation& how,

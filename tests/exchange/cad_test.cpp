@@ -272,6 +272,37 @@ TEST_F(Cad, WhatIsNotWholeIsShownWithAWarning) {
   EXPECT_NE(box["warnings"].dump().find("no length unit"), std::string::npos) << box["warnings"];
 }
 
+TEST_F(Cad, ShapesThatAreNotReadAreNamed) {
+  StepText step;
+  const int block = step.add("BLOCK('',#{},1.,2.,3.)", step.frame({0, 0, 0}));
+  const int solid = step.add("CSG_SOLID('',#{})", block);
+  step.product("csg", {solid}, "CSG_SHAPE_REPRESENTATION");
+  const std::string text = refusal(write("csg.step", step.file()));
+  EXPECT_NE(text.find("csg.step: expected a STEP file with surfaces, found only CSG solids"),
+            std::string::npos)
+      << text;
+  step.part("box", {step.box({1, 1, 1})});
+  const json found = report(write("both.step", step.file()));
+  EXPECT_EQ(found["solids"].size(), 1u);
+  EXPECT_EQ(found["warnings"], json({"CSG solids are left out"}));
+}
+
+TEST_F(Cad, NamedSurfacesOfAProductAreApart) {
+  StepText step;
+  std::vector<int> models;
+  for (const char* name : {"left", "right"}) {
+    std::vector<int> faces;
+    step.box({10, 20, 30}, &faces);
+    const int shell = step.add("OPEN_SHELL('',(#{}))", faces[0]);
+    models.push_back(step.add("SHELL_BASED_SURFACE_MODEL('{}',(#{}))", name, shell));
+  }
+  step.product("door", models, "MANIFOLD_SURFACE_SHAPE_REPRESENTATION");
+  const json found = report(write("door.step", step.file()));
+  ASSERT_EQ(found["solids"].size(), 2u) << found;
+  EXPECT_EQ(found["solids"][0]["name"], "left");
+  EXPECT_EQ(found["solids"][1]["name"], "right");
+}
+
 TEST_F(Cad, TooManyTrianglesAreRefusedWithAChordErrorThatWouldDo) {
   StepText step;
   const auto ball = step.part("ball", {step.sphere(25)});
