@@ -12,6 +12,8 @@ namespace limn::cad {
 struct Tessellation {
   double chord_mm = 0.1;  ///< The largest distance between a surface and its triangles.
   double angle_deg = 20;  ///< The largest angle between the normals at the ends of a triangle's side.
+  double solid_seconds =
+      4;  ///< Processor time for a solid, and 20 ms a face; then a larger chord error is taken.
   std::size_t most_triangles =
       10'000'000;  ///< A model of more is refused, with the chord error that would do.
 };

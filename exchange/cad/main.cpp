@@ -34,7 +34,7 @@ namespace {
 
 constexpr const char* k_help =
     "Usage: limn-cad FILE --out OUT [--as part|parts|variants] [--chord-mm 0.1] [--angle-deg 20] [--json]\n"
-    "                [--most-triangles N] [--progress] [--memory-mb N]\n"
+    "                [--solid-seconds S] [--most-triangles N] [--progress] [--memory-mb N]\n"
     "       limn-cad FILE --curves [--edges] [--chord-mm 0.01]\n"
     "       limn-cad CURVES.json --out OUT.step\n\n"
     "Reads a STEP or IGES file and writes its surfaces as triangles (GLB, in metres). `limn` starts this\n"
@@ -46,6 +46,7 @@ constexpr const char* k_help =
     "solid\n"
     "  --chord-mm MM      Largest distance between surfaces and triangles\n"
     "  --angle-deg DEG    Largest angle between the normals at the ends of a triangle's side\n"
+    "  --solid-seconds S  Take a larger chord error for a solid that needs more processor time (4)\n"
     "  --most-triangles N Refuse a file of more (10000000)\n"
     "  --curves           Print the curves that bound no surface instead\n"
     "  --edges            Also the edges of surfaces\n"
@@ -95,6 +96,7 @@ Status read_value(const std::string& option, const std::string& value, Options* 
     options->how.most_triangles = static_cast<std::size_t>(most);
     return {};
   }
+  if (option == "--solid-seconds") return read_number(option, value, 0.01, 1e6, &options->how.solid_seconds);
   if (option == "--memory-mb") return read_number(option, value, 16, 1e6, &options->memory_mb);
   return usage_error("expected an option of limn-cad (limn-cad --help), found '{}'.", option);
 }
@@ -169,16 +171,15 @@ struct Problem {
   int code;
 };
 
-Problem no_results() {
-  return {"standard output: expected to write the results, found it closed or full.", k_not_written};
-}
+const Problem k_no_results = {"standard output: expected to write the results, found it closed or full.",
+                              k_not_written};
 
 std::optional<Problem> print_curves(const Options& options, int results, ProgressLines* progress) {
   CurveSampling how{.with_edges = options.edges};
   if (options.chord_mm) how.chord_mm = *options.chord_mm;
   const auto list = read_curves(options.file, how, progress);
   if (!list) return Problem{list.message(), k_wrong_file};
-  if (!write_all(results, exchange::encode_curve_list(*list) + "\n")) return no_results();
+  if (!write_all(results, exchange::encode_curve_list(*list) + "\n")) return k_no_results;
   return std::nullopt;
 }
 
@@ -207,7 +208,7 @@ std::optional<Problem> run(const Options& options, int results) {
   for (const std::string& warning : model->warnings)
     if (!options.json) std::cerr << "limn-cad: warning: " << warning << '\n';
   if (!write_all(results, options.json ? json_text(report) + "\n" : sentences_of(report)))
-    return no_results();
+    return k_no_results;
   return std::nullopt;
 }
 

@@ -33,8 +33,10 @@
 #include <opencascade/XSControl_TransferReader.hxx>
 #include <opencascade/XSControl_WorkSession.hxx>
 #include <set>
+#include <string_view>
 #include <utility>
 
+#include "core/file.h"
 #include "core/utf8.h"
 
 namespace limn::cad {
@@ -236,8 +238,20 @@ void read_iges_unit(const IGESData_GlobalSection& global, OcctDocument* out) {
                     1e3 * out->metres_per_unit));
 }
 
+// Whether the file's last line is that of its terminate section. OpenCASCADE takes what there is of a cut
+// file.
+bool has_iges_end(const std::string& content) {
+  constexpr std::size_t k_section = 72;  // its letter's column
+  const std::size_t end = content.find_last_not_of(std::string_view("\r\n \t\x1A\0", 6));
+  if (end == std::string::npos) return false;
+  const std::size_t begin = content.find_last_of("\r\n", end) + 1;  // npos + 1 is 0
+  return end - begin >= k_section && content[begin + k_section] == 'T';
+}
+
 Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
   OcctDocument out{.document = new_document(), .format = "IGES"};
+  LIMN_TRY(const std::string content, read_file(path));
+  if (!has_iges_end(content)) return damaged(path, "IGES", "one whose end is missing");
   IGESCAFControl_Reader reader;
   reader.SetReadVisible(true);
   if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
@@ -252,6 +266,10 @@ Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
 }
 
 }  // namespace
+
+std::string a_file(const std::string& format) {
+  return (format == "IGES" ? "an IGES" : "a STEP") + std::string(" file");
+}
 
 Handle(TDocStd_Document) new_document() {
   Handle(TDocStd_Document) document;

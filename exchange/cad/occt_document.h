@@ -28,6 +28,9 @@ struct OcctDocument {
   std::vector<std::string> warnings = {};
 };
 
+/// "a STEP file", "an IGES file".
+std::string a_file(const std::string& format);
+
 /// An empty document.
 Handle(TDocStd_Document) new_document();
 

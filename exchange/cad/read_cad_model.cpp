@@ -301,8 +301,8 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
     model.warnings.push_back(fmt::format("{} hidden shapes are left out", leaves.hidden));
   if (model.nodes.empty())
     return error(
-        "{}: expected {} file with surfaces, found only {}. Export solids or surfaces by their boundaries.",
-        path.string(), document.format == "STEP" ? "a STEP" : "an IGES",
+        "{}: expected {} with surfaces, found only {}. Export solids or surfaces by their boundaries.",
+        path.string(), a_file(document.format),
         document.unread.empty() ? "points, curves and hidden shapes" : document.unread);
   if (!document.unread.empty()) model.warnings.push_back(fmt::format("{} are left out", document.unread));
   model.format = document.format;

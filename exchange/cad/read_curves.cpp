@@ -188,8 +188,8 @@ Result<exchange::CurveList> read_curves(const fs::path& path,
           path.string(), k_most_points / 1'000'000, how.chord_mm);
   }
   if (curves.all.empty())
-    return error("{}: expected a {} file with curves, found {}. Export the curves themselves{}.",
-                 path.string(), document.format, how.with_edges ? "none" : "none that bounds no surface",
+    return error("{}: expected {} with curves, found {}. Export the curves themselves{}.", path.string(),
+                 a_file(document.format), how.with_edges ? "none" : "none that bounds no surface",
                  how.with_edges ? "" : ", or read the edges of surfaces (--edges)");
   return exchange::CurveList{.curves = std::move(curves.all), .warnings = document.warnings};
 }

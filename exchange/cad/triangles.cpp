@@ -27,8 +27,10 @@ namespace {
 constexpr double k_metres = 1e-3;      // the document's shapes are in millimetres
 constexpr int k_most_samples = 20000;  // triangles of a shape on which the chord error is measured
 constexpr int k_most_tries = 4, k_most_coarser = 6;
-constexpr double k_seconds = 4, k_seconds_a_face = 0.02;  // processor time; nearly all shapes take far less
-constexpr double k_safety = 0.9, k_finest = 0.05;         // shares of the wanted chord error
+constexpr double k_seconds_a_face = 0.02;          // processor time; nearly all faces take far less
+constexpr double k_safety = 0.9, k_finest = 0.05;  // shares of the wanted chord error
+// Between the points at which it is measured a surface is a little farther from its triangles.
+constexpr double k_measured = 0.98;
 
 Eigen::Vector3d vector_of(const gp_XYZ& v) { return {v.X(), v.Y(), v.Z()}; }
 
@@ -69,10 +71,10 @@ class Deadline : public Message_ProgressIndicator {
 };
 
 // Whether the mesher came to its end in time.
-bool cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
+bool cut_shape(const TopoDS_Shape& shape, double chord_mm, const Tessellation& how) {
   IMeshTools_Parameters parameters;
   parameters.Deflection = chord_mm;
-  parameters.Angle = angle_deg * M_PI / 180;
+  parameters.Angle = how.angle_deg * M_PI / 180;
   parameters.AngleInterior = parameters.Angle;
   // Shorter sides would follow kinks that are smaller than the chord error, in some files without end.
   parameters.MinSize = chord_mm;
@@ -80,18 +82,18 @@ bool cut_shape(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
   BRepTools::Clean(shape);
   TopTools_IndexedMapOfShape faces;
   TopExp::MapShapes(shape, TopAbs_FACE, faces);
-  const Handle(Deadline) deadline = new Deadline(k_seconds + k_seconds_a_face * faces.Extent());
+  const Handle(Deadline) deadline = new Deadline(how.solid_seconds + k_seconds_a_face * faces.Extent());
   const BRepMesh_IncrementalMesh mesher(shape, parameters, deadline->Start());
   return !deadline->UserBreak();
 }
 
 // Large shapes, and surfaces on which a refinement comes no nearer, need too many triangles for a small chord
 // error: they are cut with a larger one. Whether that was so.
-bool cut_in_time(const TopoDS_Shape& shape, double chord_mm, double angle_deg) {
+bool cut_in_time(const TopoDS_Shape& shape, double chord_mm, const Tessellation& how) {
   constexpr double k_coarser = 8;
-  if (cut_shape(shape, chord_mm, angle_deg)) return false;
+  if (cut_shape(shape, chord_mm, how)) return false;
   for (int tried = 1; tried <= k_most_coarser; ++tried)
-    if (cut_shape(shape, chord_mm *= k_coarser, angle_deg)) break;
+    if (cut_shape(shape, chord_mm *= k_coarser, how)) break;
   return true;
 }
 
@@ -249,14 +251,14 @@ Triangulated triangulated(const TopoDS_Shape& shape,
   std::vector<Cut> cuts;
   double chord_mm = how.chord_mm;
   for (int tried = 1; tried <= k_most_tries; ++tried) {
-    const bool is_coarse = cut_in_time(shape, chord_mm, how.angle_deg);
+    const bool is_coarse = cut_in_time(shape, chord_mm, how);
     cuts = cuts_of(shape, &out.lost_faces);
     const std::vector<double> errors = chord_errors_mm(cuts);
     const double worst_mm = errors.empty() ? 0 : *std::max_element(errors.begin(), errors.end());
     out.mesh.chord_error_mm = worst_mm;
     out.coarse_faces = static_cast<int>(
         std::count_if(errors.begin(), errors.end(), [&](double mm) { return mm > how.chord_mm; }));
-    if (worst_mm <= how.chord_mm || is_coarse) break;
+    if (worst_mm <= k_measured * how.chord_mm || is_coarse) break;
     chord_mm =
         std::max(k_finest * how.chord_mm, chord_mm * std::min(k_safety, k_safety * how.chord_mm / worst_mm));
   }

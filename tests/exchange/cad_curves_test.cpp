@@ -134,6 +134,29 @@ TEST_F(CadCurves, CurvesOfOtherProgramsAreRead) {
   EXPECT_GT(worst_along(curves[1], from_circle), 0.0005e-3) << "far too many points";
 }
 
+TEST_F(CadCurves, SegmentsThatTheFileJoinsAreOneCurve) {
+  StepText step;
+  const int a = step.point({0, 0, 0}), b = step.point({10, 0, 0}), c = step.point({10, 10, 0}),
+            d = step.point({20, 10, 0});
+  const int lines[] = {step.add("POLYLINE('',(#{},#{}))", a, b), step.add("POLYLINE('',(#{},#{}))", c, b),
+                       step.add("POLYLINE('',(#{},#{}))", c, d)};
+  std::string segments;
+  for (std::size_t i = 0; i < 3; ++i)
+    segments += fmt::format(
+        "{}#{}", i == 0 ? "" : ",",
+        step.add("COMPOSITE_CURVE_SEGMENT(.CONTINUOUS.,{},#{})", i == 1 ? ".F." : ".T.", lines[i]));
+  const int whole = step.add("COMPOSITE_CURVE('steps',({}),.F.)", segments);
+  const int set = step.add("GEOMETRIC_CURVE_SET('',(#{}))", whole);
+  step.product("drawing", {set}, "GEOMETRICALLY_BOUNDED_WIREFRAME_SHAPE_REPRESENTATION");
+  const auto curves = read(write("steps.step", step.file()));
+  ASSERT_EQ(curves.size(), 1u);
+  EXPECT_EQ(curves[0].name, "steps");
+  const std::vector<Vector3d> corners = {{0, 0, 0}, {0.01, 0, 0}, {0.01, 0.01, 0}, {0.02, 0.01, 0}};
+  ASSERT_EQ(curves[0].points.size(), corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    EXPECT_TRUE(test::near(curves[0].points[i], corners[i], 1e-9)) << i;
+}
+
 TEST_F(CadCurves, EdgesOfSurfacesAreReadWhenAskedFor) {
   StepText step;
   step.part("box", {step.box({10, 20, 30})});

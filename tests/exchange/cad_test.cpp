@@ -137,6 +137,20 @@ TEST_F(Cad, TheChordErrorHoldsOnCurvedSurfaces) {
   EXPECT_LE(worst_of(load(folder / "out.glb"), from_ring), 0.01_mm);
 }
 
+TEST_F(Cad, AShapeThatTakesTooLongGetsALargerChordErrorThatIsStated) {
+  StepText step;
+  step.part("ball", {step.sphere(20)});
+  const json found =
+      report(write("ball.step", step.file()), {"--chord-mm", "0.0005", "--solid-seconds", "0.05"});
+  const double error_mm = found["chord_error_mm"];
+  EXPECT_GT(error_mm, 0.0005);
+  EXPECT_LT(error_mm, 2);
+  EXPECT_NE(found["warnings"].dump().find("larger than 0.0005 mm in 1 faces"), std::string::npos)
+      << found["warnings"];
+  EXPECT_LE(worst_of(load(folder / "out.glb"), [](const Vector3d& p) { return p.norm() - 0.020; }),
+            1.02e-3 * error_mm);
+}
+
 // ---- IGES
 
 TEST_F(Cad, AnIgesBoxHasItsSizeAndColourInEveryUnit) {
@@ -245,6 +259,11 @@ TEST_F(Cad, DamagedFilesAreRefusedByTheirName) {
   says(refusal(write("empty.step", "")), "empty.step: expected a");
   says(refusal(write("cut.step", whole.substr(0, whole.size() / 2))), "cut.step: expected a");
   says(refusal(write("text.igs", "this is no IGES file\n")), "text.igs: expected a");
+  IgesText iges;
+  iges.box({0, 0, 0}, {1, 1, 1});
+  iges.box({2, 0, 0}, {3, 1, 1});
+  const std::string boxes = iges.file();
+  says(refusal(write("cut.igs", boxes.substr(0, boxes.size() - 200))), "cut.igs: expected a whole IGES file");
   says(refusal(folder / "absent.step"), "found no file");
   StepText nothing;
   nothing.part("empty", {});
