@@ -19,6 +19,14 @@ Result<MeshContent> read_safely(const fs::path& path) {
   return read_mesh_content(path);
 }
 
+Result<MeshContent> load_content(const fs::path& path) {
+  if (!is_mesh_name(path)) return read_mesh_content(path).error();
+  if (std::error_code code; !fs::is_regular_file(path, code)) {
+    return error("{}: expected a mesh file, found no file. Check the name.", path.string());
+  }
+  return read_safely(path);
+}
+
 }  // namespace
 
 double metres_per_unit(LengthUnit units) {
@@ -38,12 +46,16 @@ double metres_per_unit(LengthUnit units) {
 }
 
 Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
-  if (!is_mesh_name(path)) return read_mesh_content(path).error();
-  if (std::error_code code; !fs::is_regular_file(path, code)) {
-    return error("{}: expected a mesh file, found no file. Check the name.", path.string());
-  }
-  LIMN_TRY(const MeshContent content, read_safely(path));
-  return mesh_from_content(content, path, units);
+  LIMN_TRY(MeshContent content, load_content(path));
+  content.variants.clear();
+  for (MeshPiece& piece : content.pieces) piece.variant_materials.clear();
+  LIMN_TRY(MeshWithVariants meshes, meshes_from_content(std::move(content), path, units));
+  return std::move(meshes.mesh);
+}
+
+Result<MeshWithVariants> load_mesh_with_variants(const fs::path& path, std::optional<LengthUnit> units) {
+  LIMN_TRY(MeshContent content, load_content(path));
+  return meshes_from_content(std::move(content), path, units);
 }
 
 }  // namespace limn::scene
