@@ -25,7 +25,14 @@ struct GpuMaterial {
   Eigen::Vector4f emitted = {0, 0, 0, -1};
   Eigen::Vector4f maps = {-1, -1, 1, 1};
   Eigen::Vector4i more = Eigen::Vector4i::Zero();
+  Eigen::Vector4f coat = {0, 0, 1, -1};
+  Eigen::Vector4f more_maps = {-1, -1, -1, 0};
+  Eigen::Vector4i second = Eigen::Vector4i::Zero();
 };
+
+// As in shaders/material.glsl.
+constexpr int k_second_map = 1, k_second_normals = 2, k_second_occlusion = 4, k_second_emission = 8,
+              k_second_coat = 16, k_second_coat_roughness = 32, k_second_coat_normals = 64;
 
 template <class T>
 GlName buffer_of(const std::vector<T>& items) {
@@ -39,10 +46,12 @@ std::size_t triangles_of(const scene::Scene& scene) {
   return count;
 }
 
-// Number of triangles with tangents, plus that of triangles with colours: these are stored after the normals.
+// Number of triangles with tangents, plus those of triangles with second uvs and with colours: these are
+// stored after the normals.
 std::size_t triangles_after_normals(const scene::Scene& scene) {
   const auto of = [](const scene::Mesh& mesh) {
     return (mesh.tangents.empty() ? 0 : mesh.triangles.size()) +
+           (mesh.second_uvs.empty() ? 0 : mesh.triangles.size()) +
            (mesh.colours.empty() ? 0 : mesh.triangles.size());
   };
   std::size_t count = scene.prototype ? of(scene.prototype->mesh) : 0;
@@ -214,11 +223,30 @@ scene::Texture packed(const scene::SurfaceMaps& maps) {
   return {all, metal.file.empty() ? open.file : metal.file};
 }
 
+// Adds the layer of a map to s_maps, and its bit if it lies in the second texture coordinates.
+float add_map(const scene::Texture& map, int bit, GpuMaterial* gpu, std::vector<scene::Texture>* layers) {
+  if (map.image.empty()) return -1;
+  if (map.in_second_uvs) gpu->second.y() |= bit;
+  return layer_of(map, layers);
+}
+
+// The layers of occlusion, roughness and metalness: one, or two where they lie in different coordinates.
+void add_packed(const scene::SurfaceMaps& maps, GpuMaterial* gpu, std::vector<scene::Texture>* layers) {
+  const scene::Texture &metal = maps.metallic_roughness, &open = maps.occlusion;
+  if (metal.image.empty() && open.image.empty()) return;
+  const bool are_apart =
+      !metal.image.empty() && !open.image.empty() && metal.in_second_uvs != open.in_second_uvs;
+  scene::Texture together = are_apart ? metal : packed(maps);
+  together.in_second_uvs = metal.image.empty() ? open.in_second_uvs : metal.in_second_uvs;
+  gpu->maps.x() = add_map(together, k_second_map, gpu, layers);
+  if (are_apart) gpu->more_maps.z() = add_map(open, k_second_occlusion, gpu, layers);
+}
+
 }  // namespace
 
 struct GpuScene::Staging {
   std::vector<Eigen::Vector4f> corners, normals;
-  std::vector<Eigen::Vector4f> after_normals;  // tangents and colours at the corners
+  std::vector<Eigen::Vector4f> after_normals;  // tangents, second uvs and colours at the corners
   std::vector<GpuTriangle> triangles;
   std::vector<GpuMaterial> materials;
   std::vector<scene::Texture> colour_maps, maps;
@@ -235,8 +263,8 @@ Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
   if (count <= most) return {};
   return error(
       "scene: expected at most {} triangles in the prototype and all variants (the largest buffer of {}; "
-      "triangles of meshes with a normal map or with colours at their vertices count twice), found {}. "
-      "Simplify the largest mesh.",
+      "triangles count once more for each of a normal map, second texture coordinates and colours at their "
+      "vertices), found {}. Simplify the largest mesh.",
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
@@ -291,7 +319,8 @@ GpuScene::GpuScene(const scene::Scene& scene) {
   glEnableVertexArrayAttrib(*vertex_array_, 0);
 }
 
-void GpuScene::add_material(const scene::Material& material, bool has_uvs, Staging* staging) {
+void GpuScene::add_material(const scene::Material& material, const scene::Mesh& mesh, Staging* staging) {
+  const bool has_uvs = !mesh.uvs.empty();
   GpuMaterial gpu{material.base_colour.homogeneous(), Eigen::Vector4f::Constant(-1)};
   gpu.colour.w() = material.unlit ? 1 : 0;
   gpu.parameters.tail<3>() << material.metallic, material.roughness, 0;
@@ -304,14 +333,35 @@ void GpuScene::add_material(const scene::Material& material, bool has_uvs, Stagi
   const scene::SurfaceMaps& maps = material.maps;
   if (has_uvs && !maps.is_none()) {
     has_surface_maps_ = true;
-    if (!maps.emission.image.empty()) gpu.emitted.w() = layer_of(maps.emission, &staging->colour_maps);
-    if (!maps.metallic_roughness.image.empty() || !maps.occlusion.image.empty())
-      gpu.maps.x() = layer_of(packed(maps), &staging->maps);
-    if (!maps.normals.image.empty()) gpu.maps.y() = layer_of(maps.normals, &staging->maps);
+    gpu.emitted.w() = add_map(maps.emission, k_second_emission, &gpu, &staging->colour_maps);
+    add_packed(maps, &gpu, &staging->maps);
+    gpu.maps.y() = add_map(maps.normals, k_second_normals, &gpu, &staging->maps);
     gpu.more.y() = maps.metallic_roughness.image.empty() ? 0 : 1;
     gpu.maps.tail<2>() << maps.normal_scale, maps.occlusion_strength;
   }
+  const scene::Clearcoat& coat = material.coat;
+  gpu.coat.head<3>() << coat.factor, coat.roughness, coat.normal_scale;
+  has_clearcoat_ |= coat.factor > 0;
+  if (has_uvs && coat.factor > 0) {
+    gpu.more_maps.x() = add_map(coat.factor_map, k_second_coat, &gpu, &staging->maps);
+    gpu.more_maps.y() = add_map(coat.roughness_map, k_second_coat_roughness, &gpu, &staging->maps);
+    gpu.coat.w() = add_map(coat.normals, k_second_coat_normals, &gpu, &staging->maps);
+    has_surface_maps_ |= coat.has_maps();
+  }
+  if (mesh.second_uvs.empty()) gpu.second.y() = 0;
   staging->materials.push_back(gpu);
+}
+
+// Must be called before the mesh's own corners are added.
+void GpuScene::add_second_uvs(const scene::Mesh& mesh, std::size_t first_material, Staging* staging) {
+  if (mesh.second_uvs.empty()) return;
+  has_second_uvs_ = true;
+  const std::size_t first = 3 * staging->triangles.size() + staging->after_normals.size();
+  for (std::size_t i = first_material; i < staging->materials.size(); ++i)
+    staging->materials[i].second.x() = static_cast<int>(first) - static_cast<int>(staging->corners.size());
+  for (const auto& triangle : mesh.triangles)
+    for (const std::uint32_t i : triangle)
+      staging->after_normals.push_back((Eigen::Vector4f() << mesh.second_uvs[i], 0, 0).finished());
 }
 
 // Must be called before the mesh's own corners are added.
@@ -320,7 +370,7 @@ void GpuScene::add_tangents(const scene::Mesh& mesh, std::size_t first_material,
   const std::size_t first = 3 * staging->triangles.size() + staging->after_normals.size();
   for (std::size_t i = first_material; i < staging->materials.size(); ++i) {
     GpuMaterial& material = staging->materials[i];
-    if (mesh.tangents.empty()) material.maps.y() = -1;
+    if (mesh.tangents.empty()) material.maps.y() = material.coat.w() = -1;
     material.more.x() = static_cast<int>(first) - static_cast<int>(staging->corners.size());
   }
   if (mesh.tangents.empty()) return;
@@ -343,7 +393,7 @@ void GpuScene::add_colours(const scene::Mesh& mesh, std::size_t first_material, 
 
 TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) {
   const auto first_material = static_cast<std::uint32_t>(staging->materials.size());
-  for (const scene::Material& material : mesh.materials) add_material(material, !mesh.uvs.empty(), staging);
+  for (const scene::Material& material : mesh.materials) add_material(material, mesh, staging);
   TriangleRun run;
   run.has_cut_outs = std::any_of(staging->materials.begin() + static_cast<std::ptrdiff_t>(first_material),
                                  staging->materials.end(),
@@ -352,6 +402,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   run.first = static_cast<int>(staging->corners.size() / 3);
   run.count = static_cast<int>(mesh.triangles.size());
   add_tangents(mesh, first_material, staging);
+  add_second_uvs(mesh, first_material, staging);
   add_colours(mesh, first_material, staging);
   Eigen::AlignedBox3d bounds;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {

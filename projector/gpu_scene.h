@@ -66,6 +66,8 @@ class GpuScene final : public Bindable {
   /// Defines that the shading programs need for the scene's materials.
   Defines shading_defines() const {
     return (has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}) +
+           (has_clearcoat_ ? Defines{Define::clearcoat} : Defines{}) +
+           (has_second_uvs_ ? Defines{Define::second_uvs} : Defines{}) +
            (has_vertex_colours_ ? Defines{Define::vertex_colours} : Defines{});
   }
   GLuint vertex_array() const { return *vertex_array_; }
@@ -86,13 +88,15 @@ class GpuScene final : public Bindable {
     Eigen::Vector4f metallic_roughness = Eigen::Vector4f::Constant(-1);
   };
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
-  void add_material(const scene::Material& material, bool has_uvs, Staging* staging);
+  void add_material(const scene::Material& material, const scene::Mesh& mesh, Staging* staging);
+  void add_second_uvs(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
   void add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
   void add_colours(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
-  bool has_cut_outs_ = false, has_surface_maps_ = false, has_vertex_colours_ = false;
+  bool has_cut_outs_ = false, has_surface_maps_ = false, has_clearcoat_ = false, has_second_uvs_ = false,
+       has_vertex_colours_ = false;
   std::vector<GpuOwner> gpu_owners_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
   GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers

@@ -1,8 +1,11 @@
 #include "scene/glb.h"
 
+#include <algorithm>
 #include <cstring>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <string>
 
 #include "core/image_encoder.h"
 #include "core/json_text.h"
@@ -38,7 +41,8 @@ struct Document {
   ordered_json materials = ordered_json::array();
   std::map<const Mesh*, int> numbers = {};                   // numbers of the meshes written so far
   std::map<const std::uint8_t*, std::size_t> textures = {};  // texture numbers by pixel address
-  bool has_textures = true, is_unlit = false;
+  bool has_textures = true;
+  std::set<std::string> extensions;  // those that are used
 
   std::size_t add_view(const std::string& data) {
     while (bytes.size() % 4 != 0) bytes.push_back('\0');
@@ -88,26 +92,61 @@ struct Document {
   }
 
   // The index of a texture; an image is written only once.
-  ordered_json add_texture(const cv::Mat& image) {
+  ordered_json add_texture(const cv::Mat& image, bool in_second_uvs = false) {
     const auto [known, is_new] = textures.try_emplace(image.data, images.size());
     if (is_new) {
       images.push_back({{"bufferView", add_view(encode_png(image))}, {"mimeType", "image/png"}});
     }
-    return {{"index", known->second}};
+    ordered_json use = {{"index", known->second}};
+    if (in_second_uvs) use["texCoord"] = 1;
+    return use;
+  }
+
+  ordered_json add_texture(const Texture& texture) {
+    return add_texture(texture.image, texture.in_second_uvs);
   }
 
   void add_maps(const SurfaceMaps& maps, ordered_json* surface, ordered_json* json) {
     if (!maps.metallic_roughness.image.empty())
-      (*surface)["metallicRoughnessTexture"] = add_texture(maps.metallic_roughness.image);
+      (*surface)["metallicRoughnessTexture"] = add_texture(maps.metallic_roughness);
     if (!maps.normals.image.empty()) {
-      (*json)["normalTexture"] = add_texture(maps.normals.image);
+      (*json)["normalTexture"] = add_texture(maps.normals);
       (*json)["normalTexture"]["scale"] = maps.normal_scale;
     }
     if (!maps.occlusion.image.empty()) {
-      (*json)["occlusionTexture"] = add_texture(maps.occlusion.image);
+      (*json)["occlusionTexture"] = add_texture(maps.occlusion);
       (*json)["occlusionTexture"]["strength"] = maps.occlusion_strength;
     }
-    if (!maps.emission.image.empty()) (*json)["emissiveTexture"] = add_texture(maps.emission.image);
+    if (!maps.emission.image.empty()) (*json)["emissiveTexture"] = add_texture(maps.emission);
+  }
+
+  // The extension of a clear layer. One with maps of its share has none without textures.
+  void add_coat(const Clearcoat& coat, ordered_json* json) {
+    if (coat.factor == 0 || (!has_textures && !coat.factor_map.image.empty())) return;
+    ordered_json extension = {{"clearcoatFactor", coat.factor}, {"clearcoatRoughnessFactor", coat.roughness}};
+    if (has_textures && !coat.factor_map.image.empty())
+      extension["clearcoatTexture"] = add_texture(coat.factor_map);
+    if (has_textures && !coat.roughness_map.image.empty())
+      extension["clearcoatRoughnessTexture"] = add_texture(coat.roughness_map);
+    if (has_textures && !coat.normals.image.empty()) {
+      extension["clearcoatNormalTexture"] = add_texture(coat.normals);
+      extension["clearcoatNormalTexture"]["scale"] = coat.normal_scale;
+    }
+    add_extension("KHR_materials_clearcoat", extension, json);
+  }
+
+  void add_extension(const std::string& name, const ordered_json& extension, ordered_json* json) {
+    (*json)["extensions"][name] = extension;
+    extensions.insert(name);
+  }
+
+  // The factor of glTF's emission is at most 1; more is written as its strength.
+  void add_emission(const Eigen::Vector3f& emitted, ordered_json* json) {
+    const float strength = std::max(1.F, emitted.maxCoeff());
+    const Eigen::Vector3f e = emitted / strength;
+    (*json)["emissiveFactor"] = {e.x(), e.y(), e.z()};
+    if (strength > 1)
+      add_extension("KHR_materials_emissive_strength", {{"emissiveStrength", strength}}, json);
   }
 
   std::size_t add_material(const Material& material) {
@@ -124,24 +163,26 @@ struct Document {
       json["alphaMode"] = "MASK";
       json["alphaCutoff"] = material.cut_below;
     }
-    const Eigen::Vector3f& e = material.emitted;
     const bool glows_in_places = !material.maps.emission.image.empty();
-    if (!e.isZero() && (has_textures || !glows_in_places)) json["emissiveFactor"] = {e.x(), e.y(), e.z()};
-    if (material.unlit) json["extensions"] = {{"KHR_materials_unlit", ordered_json::object()}};
-    is_unlit |= material.unlit;
+    if (!material.emitted.isZero() && (has_textures || !glows_in_places))
+      add_emission(material.emitted, &json);
+    if (material.unlit) add_extension("KHR_materials_unlit", ordered_json::object(), &json);
+    add_coat(material.coat, &json);
     materials.push_back(json);
     return materials.size() - 1;
+  }
+
+  int add_uvs(std::vector<Eigen::Vector2f> uvs) {
+    for (Eigen::Vector2f& uv : uvs) uv.y() = 1 - uv.y();  // glTF counts v from the top row
+    return add_vectors(uvs, "VEC2", false);
   }
 
   int add_mesh(const Mesh& mesh) {
     if (const auto known = numbers.find(&mesh); known != numbers.end()) return known->second;
     ordered_json attributes = {{"POSITION", add_vectors(mesh.positions, "VEC3", true)}};
     if (!mesh.normals.empty()) attributes["NORMAL"] = add_vectors(mesh.normals, "VEC3", false);
-    if (!mesh.uvs.empty()) {
-      std::vector<Eigen::Vector2f> flipped = mesh.uvs;  // glTF counts v from the top row
-      for (Eigen::Vector2f& uv : flipped) uv.y() = 1 - uv.y();
-      attributes["TEXCOORD_0"] = add_vectors(flipped, "VEC2", false);
-    }
+    if (!mesh.uvs.empty()) attributes["TEXCOORD_0"] = add_uvs(mesh.uvs);
+    if (!mesh.second_uvs.empty()) attributes["TEXCOORD_1"] = add_uvs(mesh.second_uvs);
     if (!mesh.tangents.empty()) attributes["TANGENT"] = add_vectors(mesh.tangents, "VEC4", false);
     if (!mesh.colours.empty()) attributes["COLOR_0"] = add_vectors(mesh.colours, "VEC3", false);
     ordered_json primitives = ordered_json::array();
@@ -168,7 +209,7 @@ struct Document {
                          {"accessors", accessors},
                          {"bufferViews", views},
                          {"buffers", ordered_json::array({{{"byteLength", bytes.size()}}})}};
-    if (is_unlit) json["extensionsUsed"] = {"KHR_materials_unlit"};
+    if (!extensions.empty()) json["extensionsUsed"] = extensions;
     if (!images.empty()) {
       json["images"] = images;
       json["textures"] = ordered_json::array();

@@ -16,9 +16,9 @@ struct GlbNode {
 };
 
 /// The bytes of a binary glTF 2.0 file in metres. It has a node for each mesh with its pose and one primitive
-/// per material, with positions, normals, uv and tangents (when present), base colours, metalness, roughness,
-/// and textures and surface maps as PNG. The same meshes give the same bytes. There must be at least one
-/// mesh.
+/// per material, with positions, normals, both sets of uv and tangents (when present), base colours,
+/// metalness, roughness, clearcoat, emission, and textures and surface maps as PNG. The same meshes give the
+/// same bytes. There must be at least one mesh.
 std::string encode_glb(std::span<const GlbNode> placed);
 
 /// As above, for one mesh in its own frame and without its textures.

@@ -32,7 +32,9 @@ Eigen::Vector3f colour_in(const json& parent, const char* key, const Eigen::Vect
 TexturePlace place_of(const json& use) {
   const json& transform = extension_of(use, "KHR_texture_transform");
   TexturePlace place;
-  place.coordinates = static_cast<int>(whole_number(transform, "texCoord", whole_number(use, "texCoord", 0)));
+  constexpr std::size_t k_most_sets = 1000;
+  place.coordinates = static_cast<int>(
+      std::min(whole_number(transform, "texCoord", whole_number(use, "texCoord", 0)), k_most_sets));
   if (transform.empty()) return place;
   const std::vector<float> offset = transform.value("offset", std::vector<float>{0, 0}),
                            scale = transform.value("scale", std::vector<float>{1, 1});
@@ -60,6 +62,7 @@ class Materials {
   Status read() {
     LIMN_TRY_STATUS(read_images());
     for (const json& material : file_.root().value("materials", json::array())) {
+      LIMN_TRY_STATUS(check_extensions(material));
       LIMN_TRY(MaterialSource source, read_material(material));
       content_.materials.push_back(std::move(source));
     }
@@ -74,6 +77,38 @@ class Materials {
   }
 
  private:
+  // "material 3 ('chrome')", for messages about the one that is read.
+  std::string where(const json& material) const {
+    const std::string name = material.value("name", std::string());
+    return fmt::format("material {}{}", content_.materials.size(), name.empty() ? "" : " ('" + name + "')");
+  }
+
+  // Whether the extensions that are read have the form of an extension.
+  Status check_extensions(const json& material) const {
+    for (const auto& [name, value] : object_in(material, "extensions").items())
+      if (shown_extensions().count(name) > 0 && !value.is_object())
+        return file_.problem(
+            fmt::format("{}: expected an object as {}, found {}", where(material), name, json_text(value)));
+    return {};
+  }
+
+  static const std::set<std::string>& shown_extensions() {
+    static const std::set<std::string> k_shown = {
+        "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength",
+        "KHR_materials_clearcoat"};
+    return k_shown;
+  }
+
+  // A factor of an extension; a number outside its limits is moved to them, with a warning.
+  float factor_in(const json& material, const json& extension, const char* key, float otherwise, float most) {
+    const float found = extension.value(key, otherwise), used = std::clamp(found, 0.F, most);
+    if (used != found)
+      content_.warnings.push_back(fmt::format("{}: {}: expected {} from 0 to {}, found {}. {} is used.",
+                                              file_.path().string(), where(material), key, most, found,
+                                              used));
+    return used;
+  }
+
   Status read_images() {
     for (const json& image : file_.root().value("images", json::array())) {
       TextureUse use;
@@ -94,9 +129,11 @@ class Materials {
   }
 
   Result<TextureUse> texture(const json& parent, const char* key) const {
+    if (parent.contains(key) && !parent.at(key).is_object())
+      return file_.problem(fmt::format("expected an object as {}, found {}", key, json_text(parent.at(key))));
     const json& use = object_in(parent, key);
     if (use.empty()) return TextureUse{};
-    const json& texture = file_.root().at("textures").at(whole_number(use, "index", 0));
+    const json& texture = file_.root().at("textures").at(whole_number(use.at("index")));
     const auto image = image_of(texture);
     if (!image)
       return file_.problem(fmt::format("texture {}: expected an image, found none that Limn knows ({})",
@@ -130,6 +167,18 @@ class Materials {
     return {};
   }
 
+  Status read_coat(const json& material, MaterialSource::Coat* to) {
+    const json& coat = extension_of(material, "KHR_materials_clearcoat");
+    to->factor = factor_in(material, coat, "clearcoatFactor", 0, 1);
+    if (to->factor == 0) return {};
+    to->roughness = factor_in(material, coat, "clearcoatRoughnessFactor", 0, 1);
+    LIMN_TRY(to->factor_map, texture(coat, "clearcoatTexture"));
+    LIMN_TRY(to->roughness_map, texture(coat, "clearcoatRoughnessTexture"));
+    LIMN_TRY(to->normals, texture(coat, "clearcoatNormalTexture"));
+    to->normal_scale = object_in(coat, "clearcoatNormalTexture").value("scale", 1.F);
+    return {};
+  }
+
   Result<MaterialSource> read_material(const json& material) {
     MaterialSource out{.name = material.value("name", std::string())};
     LIMN_TRY_STATUS(read_base(material, &out));
@@ -141,13 +190,14 @@ class Materials {
     LIMN_TRY(out.emission, texture(material, "emissiveTexture"));
     out.normal_scale = object_in(material, "normalTexture").value("scale", 1.F);
     out.occlusion_strength = object_in(material, "occlusionTexture").value("strength", 1.F);
-    out.emitted = extension_of(material, "KHR_materials_emissive_strength").value("emissiveStrength", 1.F) *
+    constexpr float k_most_strength = 1e6F;  // far more than any light can show
+    out.emitted = factor_in(material, extension_of(material, "KHR_materials_emissive_strength"),
+                            "emissiveStrength", 1, k_most_strength) *
                   colour_in(material, "emissiveFactor", Eigen::Vector3f::Zero());
+    LIMN_TRY_STATUS(read_coat(material, &out.coat));
     for (const auto& [name, value] : object_in(material, "extensions").items()) {
-      static const std::set<std::string> k_shown = {
-          "KHR_materials_unlit", "KHR_materials_pbrSpecularGlossiness", "KHR_materials_emissive_strength"};
       if (name == "KHR_materials_unlit") out.unlit = true;
-      if (k_shown.count(name) == 0) not_shown_.insert(name);
+      if (shown_extensions().count(name) == 0) not_shown_.insert(name);
     }
     return out;
   }

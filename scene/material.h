@@ -9,8 +9,9 @@ namespace limn::scene {
 /// An 8-bit BGR image in a mesh's uv coordinates. v counts up from its bottom row, as in OBJ; outside 0 … 1
 /// the image repeats.
 struct Texture {
-  cv::Mat image;     ///< Empty: no texture.
-  std::string file;  ///< The file it came from, for messages.
+  cv::Mat image;               ///< Empty: no texture.
+  std::string file;            ///< The file it came from, for messages.
+  bool in_second_uvs = false;  ///< It lies in Mesh::second_uvs instead of Mesh::uvs.
 };
 
 /// A surface's glTF textures other than its colour. Except for `emission` (sRGB), the levels 0 … 255 stand
@@ -31,6 +32,20 @@ struct SurfaceMaps {
   }
 };
 
+/// A clear layer over a surface, such as varnish (glTF's KHR_materials_clearcoat).
+struct Clearcoat {
+  float factor = 0;            ///< Share of the surface that it covers, 0 … 1. 0: there is none.
+  float roughness = 0;         ///< As in glTF.
+  Texture factor_map = {};     ///< Red multiplies `factor`.
+  Texture roughness_map = {};  ///< Green multiplies `roughness`.
+  Texture normals = {};        ///< As SurfaceMaps::normals. Empty: the layer has the mesh's own normals.
+  float normal_scale = 1;      ///< Multiplies x and y of `normals`.
+
+  bool has_maps() const {
+    return !factor_map.image.empty() || !roughness_map.image.empty() || !normals.image.empty();
+  }
+};
+
 /// The surface of one piece of a mesh. Colours are linear light. The texture is sRGB, 8-bit BGR (BGRA where
 /// parts of it are cut out), and multiplies base_colour. v of uv counts up from the image's bottom row, as in
 /// OBJ.
@@ -44,6 +59,7 @@ struct Material {
   float cut_below = 0;            ///< The surface has holes where the texture's alpha (0 to 1) is below this.
   Eigen::Vector3f emitted = Eigen::Vector3f::Zero();  ///< Light that the surface emits itself.
   SurfaceMaps maps = {};
+  Clearcoat coat = {};
 };
 
 }  // namespace limn::scene

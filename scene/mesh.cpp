@@ -21,6 +21,19 @@ Result<MeshContent> read_safely(const fs::path& path) {
   return read_mesh_content(path);
 }
 
+Result<MeshContent> load_content(const fs::path& path, const std::stop_token& stop) {
+  if (!is_mesh_name(path)) return read_mesh_content(path).error();
+  if (std::error_code code; !fs::is_regular_file(path, code)) {
+    return error("{}: expected a mesh file, found no file. Check the name.", path.string());
+  }
+  if (is_cad_name(path)) {
+    LIMN_TRY(const CadGlb glb, cad_as_glb(path, {}, stop));
+    LIMN_TRY(MeshContent triangles, read_safely(glb.path));
+    return with_cad_unit(std::move(triangles), glb);
+  }
+  return read_safely(path);
+}
+
 }  // namespace
 
 double metres_per_unit(LengthUnit units) {
@@ -40,21 +53,22 @@ double metres_per_unit(LengthUnit units) {
 }
 
 Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
-  return load_mesh(path, units, std::stop_token());
+  LIMN_TRY(MeshContent content, load_content(path, std::stop_token()));
+  content.variants.clear();
+  for (MeshPiece& piece : content.pieces) piece.variant_materials.clear();
+  LIMN_TRY(MeshWithVariants meshes, meshes_from_content(std::move(content), path, units));
+  return std::move(meshes.mesh);
 }
 
-Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units, const std::stop_token& stop) {
-  if (!is_mesh_name(path)) return read_mesh_content(path).error();
-  if (std::error_code code; !fs::is_regular_file(path, code)) {
-    return error("{}: expected a mesh file, found no file. Check the name.", path.string());
-  }
-  if (is_cad_name(path)) {
-    LIMN_TRY(const CadGlb glb, cad_as_glb(path, {}, stop));
-    LIMN_TRY(MeshContent triangles, read_safely(glb.path));
-    return mesh_from_content(with_cad_unit(std::move(triangles), glb), path, units);
-  }
-  LIMN_TRY(const MeshContent content, read_safely(path));
-  return mesh_from_content(content, path, units);
+Result<MeshWithVariants> load_mesh_with_variants(const fs::path& path, std::optional<LengthUnit> units) {
+  return load_mesh_with_variants(path, units, std::stop_token());
+}
+
+Result<MeshWithVariants> load_mesh_with_variants(const fs::path& path,
+                                                 std::optional<LengthUnit> units,
+                                                 const std::stop_token& stop) {
+  LIMN_TRY(MeshContent content, load_content(path, stop));
+  return meshes_from_content(std::move(content), path, units);
 }
 
 }  // namespace limn::scene

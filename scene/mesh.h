@@ -19,6 +19,8 @@ struct Mesh {
   std::vector<Eigen::Vector3f> positions;
   std::vector<Eigen::Vector3f> normals;  ///< Unit normal per position; load_mesh always fills it.
   std::vector<Eigen::Vector2f> uvs;      ///< Per position; v counts up; empty: the mesh has none.
+  /// Per position, for the textures that lie in them (Texture::in_second_uvs); empty: there are none.
+  std::vector<Eigen::Vector2f> second_uvs = {};
   /// Unit tangent per position, along the surface towards increasing u. w is 1 where normal x tangent points
   /// towards increasing v, else -1. Empty when no material has a normal map (scene/tangents.h).
   std::vector<Eigen::Vector4f> tangents = {};
@@ -41,5 +43,19 @@ double metres_per_unit(LengthUnit units);
 /// Missing normals are computed; equal vertices are merged. What is shown otherwise than the file says is a
 /// warning. Errors: unreadable or truncated file, no triangles, NaN or infinite coordinates, no unit.
 Result<Mesh> load_mesh(const std::filesystem::path& path, std::optional<LengthUnit> units);
+
+/// A mesh with the other materials that its file offers under names (glTF's KHR_materials_variants).
+struct MeshWithVariants {
+  struct Variant {
+    std::string name;  ///< As in the file; each name occurs once, and none is empty.
+    Mesh mesh;         ///< The same shape. Its textures are shared with the other variants.
+  };
+  Mesh mesh;  ///< With the materials that the file uses by default.
+  std::vector<Variant> variants;
+};
+
+/// As load_mesh(), with all material variants of the file.
+Result<MeshWithVariants> load_mesh_with_variants(const std::filesystem::path& path,
+                                                 std::optional<LengthUnit> units);
 
 }  // namespace limn::scene

@@ -105,6 +105,12 @@ std::string mesh_formats() {
   return text;
 }
 
+const std::vector<Eigen::Vector2f>* MeshPiece::find_uvs(int set) const {
+  if (set == 0) return uvs.empty() ? nullptr : &uvs;
+  const auto found = more_uvs.find(set);
+  return found == more_uvs.end() || found->second.empty() ? nullptr : &found->second;
+}
+
 void move_vertex(const Eigen::Matrix4d& m, std::size_t vertex, MeshPiece* piece) {
   const Eigen::Matrix3d turn = m.topLeftCorner<3, 3>();
   piece->positions[vertex] =

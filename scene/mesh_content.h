@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -17,12 +18,18 @@ namespace limn::scene {
 /// Triangles of one material as a file states them: its unit, its frame, with node transforms applied.
 struct MeshPiece {
   std::vector<Eigen::Vector3f> positions;
-  std::vector<Eigen::Vector3f> normals;   ///< Per position; zero or empty where the file states none.
-  std::vector<Eigen::Vector2f> uvs;       ///< Per position, v counts up; empty: none.
+  std::vector<Eigen::Vector3f> normals;  ///< Per position; zero or empty where the file states none.
+  std::vector<Eigen::Vector2f> uvs;      ///< Per position, v counts up; empty: none. The file's set 0.
+  std::map<int, std::vector<Eigen::Vector2f>> more_uvs = {};  ///< Further sets, by their numbers.
   std::vector<Eigen::Vector4f> tangents;  ///< Per position, as Mesh::tangents; empty: none.
   std::vector<Eigen::Vector3f> colours;   ///< Per position, linear RGB; empty: none.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::size_t material = 0;  ///< Index into MeshContent::materials.
+  /// The material in each of MeshContent::variants.
+  std::vector<std::size_t> variant_materials = {};
+
+  /// A set of texture coordinates; null when the piece has none of this number.
+  const std::vector<Eigen::Vector2f>* find_uvs(int set) const;
 };
 
 /// Moves a vertex with its normal and tangent by an affine matrix, as a skin's joints do.
@@ -55,6 +62,11 @@ struct MaterialSource {
   Eigen::Vector3f emitted = Eigen::Vector3f::Zero();
   TextureUse base = {}, metallic_roughness = {}, normals = {}, occlusion = {}, emission = {};
   float normal_scale = 1, occlusion_strength = 1;
+  struct Coat {
+    float factor = 0, roughness = 0, normal_scale = 1;
+    TextureUse factor_map = {}, roughness_map = {}, normals = {};
+  };
+  Coat coat = {};
 };
 
 /// The grey of surfaces whose file states no colour, linear.
@@ -71,8 +83,9 @@ struct MeshContent {
   std::vector<MeshPiece> pieces;
   std::vector<MaterialSource> materials;
   std::vector<EmbeddedImage> images;
-  std::vector<std::string> warnings;      ///< What is shown otherwise than the file says.
-  std::optional<double> metres_per_unit;  ///< Absent: the format states no unit.
+  std::vector<std::string> variants = {};  ///< Names of sets of other materials for the pieces.
+  std::vector<std::string> warnings;       ///< What is shown otherwise than the file says.
+  std::optional<double> metres_per_unit;   ///< Absent: the format states no unit.
 };
 
 /// Reads a mesh file, in the format that its name ends in. Errors: an unknown format, a file that is not

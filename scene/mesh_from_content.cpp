@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "core/log.h"
 #include "scene/read_materials.h"
@@ -22,18 +24,19 @@ constexpr float k_crease_cos = 0.7660444f;  // 40 degrees: a bevel stays sharp, 
 struct Corner {
   Eigen::Vector3f position;
   Eigen::Vector3f normal;
-  Eigen::Vector2f uv;
+  Eigen::Vector2f uv, second_uv;
   Eigen::Vector3f colour;
 };
-static_assert(sizeof(Corner) == 11 * sizeof(float));
+static_assert(sizeof(Corner) == 13 * sizeof(float));
 
 // A mesh as it comes from the file: three corners per triangle, no shared vertices.
 struct Soup {
   std::vector<Corner> corners;
   std::vector<Eigen::Vector4f> tangents;  // per corner, as in Mesh; empty: the file has none
   std::vector<std::uint16_t> triangle_materials;
-  bool has_uvs = false;
+  bool has_uvs = false, has_second_uvs = false;
   bool has_colours = false;
+  std::set<std::pair<std::size_t, int>> lacking;  // materials and the sets that pieces of theirs do not have
 };
 
 // Whether the texture's axes are parallel to its coordinates' axes, as a file's tangents assume.
@@ -42,18 +45,32 @@ bool is_upright(const TexturePlace& place) {
   return m(0, 0) > 0 && m(1, 1) > 0 && std::max(std::abs(m(0, 1)), std::abs(m(1, 0))) < 1e-6F;
 }
 
+// The texture coordinates of a piece's vertex in one mapping; zero where the piece has none.
+Eigen::Vector2f uv_at(const MeshPiece& piece, const TexturePlace& place, std::uint32_t i) {
+  const auto* uvs = piece.find_uvs(place.coordinates);
+  return uvs ? place.moved * (*uvs)[i] : Eigen::Vector2f::Zero().eval();
+}
+
 // Adds a piece whose coordinates are `metres` long.
-void append(const MeshPiece& piece, const TexturePlace& place, double metres, Soup* soup) {
-  soup->has_uvs |= !piece.uvs.empty();
+void append(const MeshPiece& piece, const MaterialSource& material, double metres, Soup* soup) {
+  const std::vector<TexturePlace> places = texture_places(material);
+  const bool has_second = places.size() > 1;
+  soup->has_uvs |= piece.find_uvs(places[0].coordinates) != nullptr;
+  soup->has_second_uvs |= has_second && piece.find_uvs(places[1].coordinates) != nullptr;
+  if (!texture_uses(material).empty())
+    for (const TexturePlace& place : places)
+      if (!piece.find_uvs(place.coordinates)) soup->lacking.emplace(piece.material, place.coordinates);
   soup->has_colours |= !piece.colours.empty();
-  const bool has_tangents = !piece.normals.empty() && !piece.tangents.empty() && is_upright(place);
+  const bool has_tangents =
+      !piece.normals.empty() && !piece.tangents.empty() && is_upright(tangent_place(material));
   if (has_tangents) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
   for (const auto& triangle : piece.triangles) {
     for (const std::uint32_t i : triangle) {
       Corner corner;
       corner.position = (piece.positions[i] * static_cast<float>(metres)).array() + 0.f;
       corner.normal = piece.normals.empty() ? Eigen::Vector3f::Zero().eval() : piece.normals[i];
-      corner.uv = piece.uvs.empty() ? Eigen::Vector2f::Zero().eval() : place.moved * piece.uvs[i];
+      corner.uv = uv_at(piece, places[0], i);
+      corner.second_uv = has_second ? uv_at(piece, places[1], i) : Eigen::Vector2f::Zero().eval();
       const bool has_colour = !piece.colours.empty() && piece.colours[i].allFinite();
       corner.colour = has_colour ? piece.colours[i] : Eigen::Vector3f::Ones().eval();
       soup->corners.push_back(corner);
@@ -67,7 +84,7 @@ void append(const MeshPiece& piece, const TexturePlace& place, double metres, So
 Soup soup_of(const MeshContent& content, double metres) {
   Soup soup;
   for (const MeshPiece& piece : content.pieces)
-    append(piece, texture_place(content.materials[piece.material]), metres, &soup);
+    append(piece, content.materials[piece.material], metres, &soup);
   return soup;
 }
 
@@ -132,11 +149,13 @@ Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
   mesh.positions.resize(count);
   mesh.normals.resize(count);
   if (soup.has_uvs) mesh.uvs.resize(count);
+  if (soup.has_second_uvs) mesh.second_uvs.resize(count);
   if (soup.has_colours) mesh.colours.resize(count);
   for (std::size_t c = 0; c < corner_count; ++c) {
     mesh.positions[remap[c]] = soup.corners[c].position;
     mesh.normals[remap[c]] = soup.corners[c].normal;
     if (soup.has_uvs) mesh.uvs[remap[c]] = soup.corners[c].uv;
+    if (soup.has_second_uvs) mesh.second_uvs[remap[c]] = soup.corners[c].second_uv;
     if (soup.has_colours) mesh.colours[remap[c]] = soup.corners[c].colour;
   }
   for (std::size_t t = 0; t < soup.triangle_materials.size(); ++t) {
@@ -149,13 +168,16 @@ Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
   return mesh;
 }
 
-// Removes the texture maps of a mesh without uvs. A material with an emission map then emits nothing.
+// Removes the texture maps of a mesh without uvs. A material with an emission map then emits nothing, and one
+// with a map of its clearcoat has none.
 void leave_out_maps(const fs::path& path, Mesh* mesh) {
   bool has_textures = false;
   for (Material& material : mesh->materials) {
-    has_textures |= !material.texture.empty() || !material.maps.is_none();
+    Clearcoat& coat = material.coat;
+    has_textures |= !material.texture.empty() || !material.maps.is_none() || coat.has_maps();
     if (!material.maps.emission.image.empty()) material.emitted.setZero();
     material.maps = {};
+    coat = {.factor = coat.factor_map.image.empty() ? coat.factor : 0, .roughness = coat.roughness};
   }
   if (!has_textures) return;
   log_warning(
@@ -164,10 +186,25 @@ void leave_out_maps(const fs::path& path, Mesh* mesh) {
       path.string());
 }
 
+// Warns of pieces without the texture coordinates that a texture of their material lies in.
+void note_lacking(const Soup& soup, const MeshContent& content, const fs::path& path) {
+  if (!soup.has_uvs) return;  // leave_out_maps() warns
+  for (const auto& [material, set] : soup.lacking) {
+    const std::string& name = content.materials[material].name;
+    log_warning(
+        "{}: material {}: expected texture coordinates of set {} on all its triangles, because textures lie "
+        "in "
+        "them, found triangles without. These textures have one colour there. Export the mesh with all sets "
+        "of "
+        "texture coordinates.",
+        path.string(), name.empty() ? std::to_string(material) : "'" + name + "'", set);
+  }
+}
+
 Status check_mesh(const Soup& soup, const fs::path& path) {
   for (std::size_t c = 0; c < soup.corners.size(); ++c) {
     const Corner& corner = soup.corners[c];
-    if (corner.position.allFinite() && corner.uv.allFinite()) continue;
+    if (corner.position.allFinite() && corner.uv.allFinite() && corner.second_uv.allFinite()) continue;
     return error(
         "{}: triangle {}: expected finite coordinates, found NaN or infinity. Repair or export the mesh "
         "again.",
@@ -205,29 +242,55 @@ Result<double> metres_of(const MeshContent& content, const fs::path& path, std::
   return given;
 }
 
-}  // namespace
+// The materials of the pieces; those that none of them uses are empty.
+std::vector<Material> used_materials(const MeshContent& content, const std::vector<Material>& all) {
+  std::vector<Material> used(all.size());
+  for (const MeshPiece& piece : content.pieces) used[piece.material] = all[piece.material];
+  return used;
+}
 
+// The mesh of the pieces with their present materials.
 Result<Mesh> mesh_from_content(const MeshContent& content,
+                               const std::vector<Material>& materials,
                                const fs::path& path,
-                               std::optional<LengthUnit> units) {
-  for (const std::string& warning : content.warnings) log_warning("{}", warning);
-  if (content.pieces.empty()) return no_triangles(path);
-  LIMN_TRY(const double metres, metres_of(content, path, units));
+                               double metres) {
   Soup soup = soup_of(content, metres);
   if (soup.triangle_materials.empty()) return no_triangles(path);
   LIMN_TRY_STATUS(check_mesh(soup, path));
+  note_lacking(soup, content, path);
   if (has_missing_normals(&soup)) make_normals(&soup);
 
   std::vector<Eigen::Vector4f> corner_tangents;
   Mesh mesh = joined(soup, &corner_tangents);
   if (mesh.triangles.empty()) return no_triangles(path);
   mesh.metres_per_unit = metres;
-  LIMN_TRY(mesh.materials, read_materials(content, path));
+  mesh.materials = used_materials(content, materials);
   if (mesh.uvs.empty()) leave_out_maps(path, &mesh);
-  const auto has_normal_map = [](const Material& m) { return !m.maps.normals.image.empty(); };
+  const auto has_normal_map = [](const Material& m) {
+    return !m.maps.normals.image.empty() || !m.coat.normals.image.empty();
+  };
   if (std::any_of(mesh.materials.begin(), mesh.materials.end(), has_normal_map))
     add_tangents(&mesh, corner_tangents);
   return mesh;
+}
+
+}  // namespace
+
+Result<MeshWithVariants> meshes_from_content(MeshContent content,
+                                             const fs::path& path,
+                                             std::optional<LengthUnit> units) {
+  for (const std::string& warning : content.warnings) log_warning("{}", warning);
+  if (content.pieces.empty()) return no_triangles(path);
+  LIMN_TRY(const double metres, metres_of(content, path, units));
+  LIMN_TRY(const std::vector<Material> materials, read_materials(content, path));
+  MeshWithVariants out;
+  LIMN_TRY(out.mesh, mesh_from_content(content, materials, path, metres));
+  for (std::size_t i = 0; i < content.variants.size(); ++i) {
+    for (MeshPiece& piece : content.pieces) piece.material = piece.variant_materials[i];
+    LIMN_TRY(Mesh mesh, mesh_from_content(content, materials, path, metres));
+    out.variants.push_back({content.variants[i], std::move(mesh)});
+  }
+  return out;
 }
 
 }  // namespace limn::scene

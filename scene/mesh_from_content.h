@@ -9,10 +9,10 @@
 
 namespace limn::scene {
 
-/// The mesh of what a file holds, as load_mesh() returns it. `path` is the file: textures that are not inside
-/// it are searched beside it, and messages begin with it.
-Result<Mesh> mesh_from_content(const MeshContent& content,
-                               const std::filesystem::path& path,
-                               std::optional<LengthUnit> units);
+/// The meshes of what a file holds, as load_mesh_with_variants() returns them. `path` is the file: textures
+/// that are not inside it are searched beside it, and messages begin with it.
+Result<MeshWithVariants> meshes_from_content(MeshContent content,
+                                             const std::filesystem::path& path,
+                                             std::optional<LengthUnit> units);
 
 }  // namespace limn::scene

@@ -9,6 +9,8 @@
 #include "scene/draco_mesh.h"
 #include "scene/gltf_file.h"
 #include "scene/gltf_materials.h"
+#include "scene/gltf_variants.h"
+#include "scene/read_materials.h"
 #include "scene/read_with_assimp.h"
 
 namespace limn::scene {
@@ -104,6 +106,9 @@ class GltfReader {
   Result<MeshContent> read() {
     LIMN_TRY_STATUS(check_extensions(file_));
     LIMN_TRY_STATUS(read_gltf_materials(&file_, &content_));
+    for (const MaterialSource& material : content_.materials)
+      for (const TextureUse* use : texture_uses(material)) sets_.insert(use->place.coordinates);
+    LIMN_TRY(content_.variants, read_variant_names(file_));
     LIMN_TRY_STATUS(place_nodes());
     for (const std::size_t node : shown_) LIMN_TRY_STATUS(add_node(node));
     content_.metres_per_unit = 1;
@@ -216,6 +221,8 @@ class GltfReader {
                                   content_.materials.size() - 1);
     DracoMesh draco;
     const json extensions = source.value("extensions", json::object());
+    out.piece.variant_materials.assign(content_.variants.size(), out.piece.material);
+    LIMN_TRY_STATUS(read_variant_materials(file_, source, content_.materials.size() - 1, &out.piece));
     if (extensions.contains("KHR_draco_mesh_compression")) {
       LIMN_TRY(draco, read_draco(extensions.at("KHR_draco_mesh_compression")));
     }
@@ -296,13 +303,9 @@ class GltfReader {
     LIMN_TRY(const auto normals, attribute(attributes, draco, "NORMAL", 3));
     LIMN_TRY(const auto tangents, attribute(attributes, draco, "TANGENT", 4));
     LIMN_TRY(auto colours, attribute(attributes, draco, "COLOR_0", 3, true));
-    const int set = texture_set(content_.materials[piece.material]);
-    LIMN_TRY(const auto uvs, attribute(attributes, draco, fmt::format("TEXCOORD_{}", set), 2));
     piece.positions = as_vectors<3>(positions);
     piece.normals = as_vectors<3>(normals);
     piece.tangents = as_vectors<4>(tangents);
-    piece.uvs = as_vectors<2>(uvs);
-    for (Eigen::Vector2f& uv : piece.uvs) uv.y() = 1 - uv.y();  // glTF counts v from the top row
     float most = 1;
     for (const float value : colours) most = std::max(most, value);
     const float full = most <= 1.001F ? 1.F
@@ -321,19 +324,19 @@ class GltfReader {
     const auto fits = [&](std::size_t size, std::size_t times = 1) {
       return size == 0 || size == count * times;
     };
-    if (fits(piece.normals.size()) && fits(piece.tangents.size()) && fits(piece.uvs.size()) &&
-        fits(piece.colours.size()) && fits(out->joints.size(), out->sets) &&
-        out->weights.size() == out->joints.size())
+    bool is_whole = true;
+    for (const int set : sets_) {
+      LIMN_TRY(const auto numbers, attribute(attributes, draco, fmt::format("TEXCOORD_{}", set), 2));
+      auto& uvs = set == 0 ? piece.uvs : piece.more_uvs[set];
+      uvs = as_vectors<2>(numbers);
+      for (Eigen::Vector2f& uv : uvs) uv.y() = 1 - uv.y();  // glTF counts v from the top row
+      is_whole &= fits(uvs.size());
+    }
+    if (is_whole && fits(piece.normals.size()) && fits(piece.tangents.size()) && fits(piece.colours.size()) &&
+        fits(out->joints.size(), out->sets) && out->weights.size() == out->joints.size())
       return {};
     return file_.problem(
         fmt::format("expected attributes of {} vertices, found other numbers of entries", count));
-  }
-
-  static int texture_set(const MaterialSource& material) {
-    for (const TextureUse* use : {&material.base, &material.metallic_roughness, &material.normals,
-                                  &material.occlusion, &material.emission})
-      if (use->is_there()) return use->place.coordinates;
-    return 0;
   }
 
   // Adds the morph targets in their default weights.
@@ -399,6 +402,7 @@ class GltfReader {
   GltfFile& file_;
   const json& root_;
   MeshContent content_;
+  std::set<int> sets_ = {0};  // texture coordinates that materials use, and the first ones
   std::vector<std::optional<Eigen::Matrix4d>> file_from_node_;
   std::vector<std::size_t> shown_;
 };

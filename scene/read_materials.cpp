@@ -140,7 +140,7 @@ class Images {
 class MaterialReader {
  public:
   MaterialReader(const MaterialSource& source, std::string name, Images* images)
-      : source_(source), place_(texture_place(source)), name_(std::move(name)), images_(*images) {}
+      : source_(source), places_(texture_places(source)), name_(std::move(name)), images_(*images) {}
 
   Result<Material> read() {
     LIMN_TRY_STATUS(check_numbers());
@@ -151,6 +151,7 @@ class MaterialReader {
     material.roughness = source_.roughness;
     LIMN_TRY_STATUS(read_base_texture(&material));
     read_maps(&material);
+    read_coat(&material.coat);
     return material;
   }
 
@@ -159,7 +160,9 @@ class MaterialReader {
     const MaterialSource& s = source_;
     const bool is_finite = s.base_colour.allFinite() && s.emitted.allFinite() && std::isfinite(s.alpha) &&
                            std::isfinite(s.metallic) && std::isfinite(s.roughness) &&
-                           std::isfinite(s.normal_scale) && std::isfinite(s.occlusion_strength);
+                           std::isfinite(s.normal_scale) && std::isfinite(s.occlusion_strength) &&
+                           std::isfinite(s.coat.factor) && std::isfinite(s.coat.roughness) &&
+                           std::isfinite(s.coat.normal_scale);
     if (is_finite) return {};
     return error(
         "{}: expected finite numbers for its colours and factors, found NaN or infinity. Repair or "
@@ -209,12 +212,35 @@ class MaterialReader {
       material->emitted.setZero();
   }
 
+  void read_coat(Clearcoat* coat) {
+    const MaterialSource::Coat& source = source_.coat;
+    if (source.factor == 0) return;
+    auto factor = map_of(source.factor_map, "clearcoat texture", "without its clearcoat");
+    if (!factor) return;
+    coat->factor = source.factor;
+    coat->roughness = source.roughness;
+    coat->factor_map = *std::move(factor);
+    coat->roughness_map = map_of(source.roughness_map, "clearcoat roughness texture",
+                                 fmt::format("with a clearcoat of roughness {} all over", source.roughness))
+                              .value_or(Texture{});
+    coat->normals =
+        map_of(source.normals, "clearcoat normal texture", "with a smooth clearcoat").value_or(Texture{});
+    coat->normal_scale = source.normal_scale;
+    if (source.normals.is_there() && !is_same_place(source.normals.place, tangent_place(source_)))
+      log_warning(
+          "{}: expected its clearcoat normal texture in the texture coordinates of its normal texture, found "
+          "others. Its relief is shown along the directions of the normal texture. Bake both into one set of "
+          "coordinates.",
+          name_);
+  }
+
   // A texture without an image when the material names none. Nullopt when the image cannot be read; a warning
   // then says how the material is shown (`instead`).
   std::optional<Texture> map_of(const TextureUse& use, const std::string& what, const std::string& instead) {
     if (!use.is_there()) return Texture{};
-    note_place(use, what);
+    const bool is_second = place_of(use, what) == 1;
     auto texture = images_.read(use, false);
+    if (texture) texture->in_second_uvs = is_second;
     if (texture) return std::move(texture).value();
     log_warning(
         "{}: expected a readable {}, found none ({}). The material is shown {}. Save the texture beside the "
@@ -223,40 +249,68 @@ class MaterialReader {
     return std::nullopt;
   }
 
-  // Warns when a texture's mapping differs from the one that all textures of the material are shown with.
-  void note_place(const TextureUse& use, const std::string& what) const {
-    const TexturePlace& own = use.place;
-    const bool is_moved = !own.moved.isApprox(place_.moved, 1e-5F);
-    if (own.coordinates == place_.coordinates && !is_moved) return;
+  // Which of the material's mappings a texture has. Warns when it is another, and is shown with the first.
+  std::size_t place_of(const TextureUse& use, const std::string& what) const {
+    const auto same = std::find_if(places_.begin(), places_.end(), [&](const TexturePlace& place) {
+      return is_same_place(place, use.place);
+    });
+    if (same != places_.end()) return static_cast<std::size_t>(same - places_.begin());
     log_warning(
-        "{}: expected its {} in the texture coordinates of its first texture (set {}), found {}. All "
-        "textures "
-        "are shown in the first one's. Bake all textures into one set of coordinates.",
-        name_, what, place_.coordinates,
-        own.coordinates != place_.coordinates ? fmt::format("coordinates {}", own.coordinates)
-                                              : std::string("another KHR_texture_transform"));
+        "{}: expected at most two mappings of its textures (texture coordinates and KHR_texture_transform), "
+        "found a third one for its {} (coordinates {}). It is shown in those of the first texture (set {}). "
+        "Bake its textures into two sets of coordinates.",
+        name_, what, use.place.coordinates, places_[0].coordinates);
+    return 0;
   }
 
   const MaterialSource& source_;
-  TexturePlace place_;
+  std::vector<TexturePlace> places_;
   std::string name_;  // names of the file and the material, for messages
   Images& images_;
 };
 
 }  // namespace
 
-TexturePlace texture_place(const MaterialSource& material) {
-  for (const TextureUse* use : {&material.base, &material.metallic_roughness, &material.normals,
-                                &material.occlusion, &material.emission})
+std::vector<const TextureUse*> texture_uses(const MaterialSource& material) {
+  const MaterialSource::Coat& coat = material.coat;
+  std::vector<const TextureUse*> uses;
+  for (const TextureUse* use :
+       {&material.base, &material.metallic_roughness, &material.normals, &material.occlusion,
+        &material.emission, &coat.factor_map, &coat.roughness_map, &coat.normals})
+    if (use->is_there()) uses.push_back(use);
+  return uses;
+}
+
+bool is_same_place(const TexturePlace& a, const TexturePlace& b) {
+  return a.coordinates == b.coordinates && a.moved.isApprox(b.moved, 1e-5F);
+}
+
+std::vector<TexturePlace> texture_places(const MaterialSource& material) {
+  std::vector<TexturePlace> places;
+  for (const TextureUse* use : texture_uses(material)) {
+    const bool is_known = std::any_of(places.begin(), places.end(), [&](const TexturePlace& place) {
+      return is_same_place(place, use->place);
+    });
+    if (!is_known && places.size() < 2) places.push_back(use->place);
+  }
+  if (places.empty()) places.emplace_back();
+  return places;
+}
+
+TexturePlace tangent_place(const MaterialSource& material) {
+  for (const TextureUse* use : {&material.normals, &material.coat.normals})
     if (use->is_there()) return use->place;
-  return {};
+  return texture_places(material)[0];
 }
 
 Result<std::vector<Material>> read_materials(const MeshContent& content, const fs::path& path) {
   std::vector<Material> materials;
   Images images(content, path);
   std::vector<bool> is_used(content.materials.size(), false);
-  for (const MeshPiece& piece : content.pieces) is_used[piece.material] = true;
+  for (const MeshPiece& piece : content.pieces) {
+    is_used[piece.material] = true;
+    for (const std::size_t material : piece.variant_materials) is_used[material] = true;
+  }
   for (std::size_t i = 0; i < content.materials.size(); ++i) {
     if (!is_used[i]) {  // its textures are not needed
       materials.emplace_back();

@@ -142,8 +142,9 @@ class AssimpReader {
       }
     }
     const auto set = static_cast<unsigned>(content_.materials[piece.material].base.place.coordinates);
+    auto& uvs = set == 0 ? piece.uvs : piece.more_uvs[static_cast<int>(set)];
     for (unsigned i = 0; mesh.HasTextureCoords(set) && i < mesh.mNumVertices; ++i)
-      piece.uvs.emplace_back(mesh.mTextureCoords[set][i].x, mesh.mTextureCoords[set][i].y);
+      uvs.emplace_back(mesh.mTextureCoords[set][i].x, mesh.mTextureCoords[set][i].y);
     for (unsigned f = 0; f < mesh.mNumFaces; ++f)
       if (const aiFace& face = mesh.mFaces[f]; face.mNumIndices == 3)
         piece.triangles.push_back({face.mIndices[0], face.mIndices[1], face.mIndices[2]});

@@ -302,13 +302,24 @@ Status check_size(const Mesh& mesh, std::optional<LengthUnit> given) {
       likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
-Result<Mesh> load_named_mesh(const MeshFile& file, const fs::path& scene_path, const std::stop_token& stop) {
-  auto mesh = load_mesh(file.path, file.units, stop);
-  if (!mesh) return error("{}: {}: {}", scene_path.string(), file.where, mesh.message());
-  if (const Status size = check_size(*mesh, file.units); !size)
+Result<MeshWithVariants> load_named_mesh(const MeshFile& file,
+                                         const fs::path& scene_path,
+                                         const std::stop_token& stop) {
+  auto meshes = load_mesh_with_variants(file.path, file.units, stop);
+  if (!meshes) return error("{}: {}: {}", scene_path.string(), file.where, meshes.message());
+  if (const Status size = check_size(meshes->mesh, file.units); !size)
     return error("{}: {} ({}): {}", scene_path.string(), file.where, file.path.filename().string(),
                  size.message());
-  return mesh;
+  return meshes;
+}
+
+// The name of a material variant of a file in its slot. Names are also written into file names, so that
+// slashes and control characters are replaced.
+std::string variant_name(const std::string& file_variant, const std::string& material_variant) {
+  std::string name = file_variant + " " + material_variant;
+  for (char& c : name)
+    if (c == '/' || c == '\\' || static_cast<unsigned char>(c) < ' ') c = '-';
+  return name;
 }
 
 Status load_albedo_image(const fs::path& path, const fs::path& scene_path, Prototype* prototype) {
@@ -364,12 +375,18 @@ Result<std::map<std::string, LengthUnit>> load_units(const fs::path& file) {
   return units;
 }
 
+// A file's variants of a slot: that of its default materials, and those of its material variants.
+struct FileVariants {
+  Variant first;
+  std::vector<MeshWithVariants::Variant> more;
+};
+
 // Imports a mesh from a slot's folder; `known_units` has the units that people have given, by variant.
-Result<Variant> auto_import_mesh(const fs::path& file,
-                                 const Slot& slot,
-                                 std::span<const Variant> variants,
-                                 const std::map<std::string, LengthUnit>& known_units,
-                                 const std::stop_token& stop) {
+Result<FileVariants> auto_import_mesh(const fs::path& file,
+                                      const Slot& slot,
+                                      std::span<const Variant> variants,
+                                      const std::map<std::string, LengthUnit>& known_units,
+                                      const std::stop_token& stop) {
   const std::string name = file.stem().string();
   if (!is_utf8(name))
     return error("{}: expected a file name in UTF-8, found other bytes. Rename the file.",
@@ -382,20 +399,42 @@ Result<Variant> auto_import_mesh(const fs::path& file,
   Variant::AutoImported import{std::nullopt, false};
   if (known != known_units.end()) import.units = known->second;
   import.is_guess = !import.units && !states_unit(file);
-  LIMN_TRY(Mesh mesh, load_mesh(file, import.is_guess ? LengthUnit::metre : import.units, stop));
+  LIMN_TRY(MeshWithVariants meshes,
+           load_mesh_with_variants(file, import.is_guess ? LengthUnit::metre : import.units, stop));
+  Mesh mesh = std::move(meshes.mesh);
   if (import.is_guess) import.units = guessed_units(mesh);
   if (import.is_guess) mesh = scaled(std::move(mesh), *import.units);
   if (const Status size = check_size(mesh, import.units); !size)
     return error("{}: {}", file.string(), size.message());
   Variant variant{name, std::move(mesh), import};
   if (import.is_guess) log_info("{}", units_question(slot, variant));
-  return variant;
+  return FileVariants{std::move(variant), std::move(meshes.variants)};
 }
 
 // What is left out of a scene: variants that cannot be loaded, and files that are none.
 struct LeftOut {
   std::vector<SkippedVariant> variants, others;
 };
+
+// Adds a file's material variants to a slot's variants. One whose name is taken is left out.
+void add_material_variants(const Slot& slot,
+                           const fs::path& file,
+                           const std::string& file_variant,
+                           std::vector<MeshWithVariants::Variant> more,
+                           std::vector<Variant>* variants,
+                           LeftOut* left_out) {
+  for (MeshWithVariants::Variant& variant : more) {
+    const std::string name = variant_name(file_variant, variant.name);
+    if (find_named(slot.variants, name) || find_named(*variants, name))
+      left_out->others.push_back(
+          {slot.name, name,
+           fmt::format("{}: expected a name for its material variant '{}' that no other variant of slot '{}' "
+                       "has, found '{}' twice. Rename one of them.",
+                       as_utf8(file.string()), variant.name, slot.name, name)});
+    else
+      variants->push_back({name, std::move(variant.mesh), {}, file_variant});
+  }
+}
 
 // Loads the variants that scene.json lists, and the meshes in slots/NAME/.
 Status load_variants(std::span<const MeshFile> listed,
@@ -406,21 +445,27 @@ Status load_variants(std::span<const MeshFile> listed,
                      LeftOut* left_out) {
   std::vector<Variant> variants;
   for (std::size_t i = 0; i < listed.size(); ++i) {
-    auto mesh = load_named_mesh(listed[i], path, stop);
-    if (mesh)
-      variants.push_back({slot->variants[i].name, std::move(*mesh)});
-    else
-      left_out->variants.push_back({slot->name, slot->variants[i].name, mesh.message(), i == 0});
+    const std::string& name = slot->variants[i].name;
+    auto meshes = load_named_mesh(listed[i], path, stop);
+    if (!meshes) {
+      left_out->variants.push_back({slot->name, name, meshes.message(), i == 0});
+      continue;
+    }
+    variants.push_back({name, std::move(meshes->mesh)});
+    add_material_variants(*slot, listed[i].path, name, std::move(meshes->variants), &variants, left_out);
   }
   const fs::path folder = scene_folder / "slots" / slot->name;
   LIMN_TRY(const auto known_units, load_units(folder / "units.json"));
   const SlotFolder files = list_slot_folder(folder);
   for (const fs::path& file : files.meshes) {
-    auto variant = auto_import_mesh(file, *slot, variants, known_units, stop);
-    if (variant)
-      variants.push_back(std::move(*variant));
-    else
-      left_out->variants.push_back({slot->name, as_utf8(file.stem().string()), variant.message()});
+    auto found = auto_import_mesh(file, *slot, variants, known_units, stop);
+    if (!found) {
+      left_out->variants.push_back({slot->name, as_utf8(file.stem().string()), found.message()});
+      continue;
+    }
+    const std::string name = found->first.name;
+    variants.push_back(std::move(found->first));
+    add_material_variants(*slot, file, name, std::move(found->more), &variants, left_out);
   }
   for (const SlotFolder::Other& other : files.others)
     left_out->others.push_back({slot->name, as_utf8(other.path.filename().string()),
@@ -453,7 +498,8 @@ Status load_files(const Reader& reader,
                   Scene* scene,
                   LeftOut* left_out) {
   if (scene->prototype) {
-    LIMN_TRY(scene->prototype->mesh, load_named_mesh(*reader.prototype_mesh, path, stop));
+    LIMN_TRY(MeshWithVariants meshes, load_named_mesh(*reader.prototype_mesh, path, stop));
+    scene->prototype->mesh = std::move(meshes.mesh);
     for (Material& material : scene->prototype->mesh.materials)
       material.cut_below = 0;  // the physical prototype has no transparent parts
     if (reader.albedo_image) {

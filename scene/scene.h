@@ -41,6 +41,8 @@ struct Variant {
   std::string name;
   Mesh mesh;
   std::optional<AutoImported> auto_imported = {};
+  /// Where it is the same file with other materials: the name of the variant with the file's default ones.
+  std::string default_variant = {};
 };
 
 /// A place for one part, carried by one marker or constellation.
@@ -107,10 +109,12 @@ std::string to_text(const SkippedVariant& skipped);
 enum class EmptySlots { left_out, kept };
 
 /// Reads a scene; `path` is the scene.json or its folder. Meshes in slots/NAME/ of the folder become variants
-/// of slot NAME, named after their files. Their units are those of slots/NAME/units.json (limn.units/1), or
-/// those that the files state, or are guessed, with a message. A variant that cannot be loaded is an error.
-/// With `skipped_variants` it is instead left out and listed there; a slot without any variant is then left
-/// out with its controls. What is no variant in slots/ is listed there, too, or else reported as a warning.
+/// of slot NAME, named after their files. The material variants of a file (KHR_materials_variants) become
+/// variants, too, named "NAME VARIANT"; NAME itself has the file's default materials. Their units are those
+/// of slots/NAME/units.json (limn.units/1), or those that the files state, or are guessed, with a message. A
+/// variant that cannot be loaded is an error. With `skipped_variants` it is instead left out and listed
+/// there; a slot without any variant is then left out with its controls. What is no variant in slots/ is
+/// listed there, too, or else reported as a warning.
 Result<Scene> load_scene(const std::filesystem::path& path,
                          std::vector<SkippedVariant>* skipped_variants = nullptr,
                          EmptySlots empty_slots = EmptySlots::left_out);

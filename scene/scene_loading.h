@@ -11,11 +11,11 @@
 
 namespace limn::scene {
 
-/// As load_mesh() of scene/mesh.h; the reading of a CAD file, which may take minutes, ends with an error when
-/// `stop` is requested.
-Result<Mesh> load_mesh(const std::filesystem::path& path,
-                       std::optional<LengthUnit> units,
-                       const std::stop_token& stop);
+/// As load_mesh_with_variants() of scene/mesh.h; the reading of a CAD file, which may take minutes, ends with
+/// an error when `stop` is requested.
+Result<MeshWithVariants> load_mesh_with_variants(const std::filesystem::path& path,
+                                                 std::optional<LengthUnit> units,
+                                                 const std::stop_token& stop);
 
 /// Likewise for load_scene() of scene/scene.h.
 Result<Scene> load_scene(const std::filesystem::path& path,

@@ -29,10 +29,22 @@ struct CornerTangent {
   float angle = 0;
 };
 
-CornerTangent corner_tangent(const Mesh& mesh, const std::array<std::uint32_t, 3>& triangle, std::size_t k) {
+// The texture coordinates of the normal map of a triangle's material.
+const std::vector<Eigen::Vector2f>& normal_map_uvs(const Mesh& mesh, std::size_t triangle) {
+  if (mesh.second_uvs.empty() || triangle >= mesh.triangle_materials.size()) return mesh.uvs;
+  const Material& material = mesh.materials[mesh.triangle_materials[triangle]];
+  const Texture& normals =
+      material.maps.normals.image.empty() ? material.coat.normals : material.maps.normals;
+  return normals.in_second_uvs ? mesh.second_uvs : mesh.uvs;
+}
+
+CornerTangent corner_tangent(const Mesh& mesh,
+                             const std::vector<Eigen::Vector2f>& uvs,
+                             const std::array<std::uint32_t, 3>& triangle,
+                             std::size_t k) {
   const std::uint32_t a = triangle[k], b = triangle[(k + 1) % 3], c = triangle[(k + 2) % 3];
   const Vector3f ab = mesh.positions[b] - mesh.positions[a], ac = mesh.positions[c] - mesh.positions[a];
-  const Eigen::Vector2f uv_ab = mesh.uvs[b] - mesh.uvs[a], uv_ac = mesh.uvs[c] - mesh.uvs[a];
+  const Eigen::Vector2f uv_ab = uvs[b] - uvs[a], uv_ac = uvs[c] - uvs[a];
   const float area = uv_ab.x() * uv_ac.y() - uv_ac.x() * uv_ab.y();
   if (!(std::abs(area) > 0)) return {};
   const float side = area > 0 ? 1.F : -1.F;
@@ -52,11 +64,13 @@ std::vector<Vector4f> made_from_uvs(const Mesh& mesh) {
   std::vector<BothHands> sums(mesh.positions.size(), BothHands{Vector3f::Zero(), Vector3f::Zero()});
   std::vector<CornerTangent> corners;
   corners.reserve(3 * mesh.triangles.size());
-  for (const auto& triangle : mesh.triangles)
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::vector<Eigen::Vector2f>& uvs = normal_map_uvs(mesh, t);
     for (std::size_t k = 0; k < 3; ++k) {
-      const CornerTangent& tangent = corners.emplace_back(corner_tangent(mesh, triangle, k));
-      sums[triangle[k]][tangent.is_mirrored ? 1 : 0] += tangent.angle * tangent.d_u;
+      const CornerTangent& tangent = corners.emplace_back(corner_tangent(mesh, uvs, mesh.triangles[t], k));
+      sums[mesh.triangles[t][k]][tangent.is_mirrored ? 1 : 0] += tangent.angle * tangent.d_u;
     }
+  }
   std::vector<Vector4f> tangents;
   tangents.reserve(corners.size());
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -98,6 +112,7 @@ void add_tangents(Mesh* mesh, std::span<const Vector4f> of_corners) {
       mesh->positions.push_back(Vector3f(mesh->positions[vertex]));
       mesh->normals.push_back(Vector3f(mesh->normals[vertex]));
       mesh->uvs.push_back(Eigen::Vector2f(mesh->uvs[vertex]));
+      if (!mesh->second_uvs.empty()) mesh->second_uvs.push_back(Eigen::Vector2f(mesh->second_uvs[vertex]));
       if (!mesh->colours.empty()) mesh->colours.push_back(Eigen::Vector3f(mesh->colours[vertex]));
       mesh->tangents.push_back(t);
     }

@@ -66,7 +66,10 @@ std::vector<scene::SkippedVariant> keep_old_variants(const scene::Scene& now, Lo
     }
     const auto place =
         std::min(old - before->variants.data(), static_cast<std::ptrdiff_t>(slot->variants.size()));
-    slot->variants.insert(slot->variants.begin() + place, *old);
+    const auto same_file = std::find_if_not(
+        old + 1, before->variants.data() + before->variants.size(),
+        [&](const scene::Variant& variant) { return variant.default_variant == skipped.variant; });
+    slot->variants.insert(slot->variants.begin() + place, old, same_file);
     kept.push_back(skipped);
   }
   loaded->skipped_variants = std::move(left_out);
@@ -84,7 +87,8 @@ scene::ShowState with_variants_of(const scene::Scene& next,
     };
     std::string& shown = show_state.slots[i].variant;
     for (const std::string& name : names)
-      if (!is_in(name, before)) shown = name;
+      if (!is_in(name, before) && find_named(next.slots[i].variants, name)->default_variant.empty())
+        shown = name;
     if (!is_in(shown, names)) shown = names.front();
   }
   return show_state;

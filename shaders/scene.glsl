@@ -26,6 +26,12 @@ struct Material {
   ivec4 more;   // x: offset from a corner's number to its tangent in s_normals (the tangent's w is its
                 // handedness); y: 1 when there is a map of roughness and metalness; z: offset to the corner's
                 // colour, likewise; w: 1 when corners have colours
+  vec4 coat;    // clear layer: its share (0: none), its roughness, scale of its normals' x and y, layer of its
+                // normals in s_maps
+  vec4 more_maps;  // layers of s_maps, or -1: share of the clear layer (x), its roughness (y), occlusion where
+                   // it lies in other coordinates than roughness and metalness (z)
+  ivec4 second;  // x: offset to the corner's second texture coordinates, likewise; y: bits k_second_… of the
+                 // textures that lie in them
 };
 layout(std430, binding = k_materials_buffer) readonly buffer Materials { Material s_materials[]; };
 // Colour textures, one in each layer; sRGB is decoded on reading.
@@ -169,30 +175,31 @@ uvec4 each_once(uvec4 ids) {
   return ids;
 }
 
-// Texture coordinates, v up.
-vec2 uv_of(Hit hit) {
-  uint first = 3u * (hit.id - 1u);
+// Texture coordinates of a triangle's corners, v up.
+mat3x2 corner_uvs(uint id) {
+  uint first = 3u * (id - 1u);
   return mat3x2(vec2(corner(first).w, normal(first).w),
                 vec2(corner(first + 1u).w, normal(first + 1u).w),
-                vec2(corner(first + 2u).w, normal(first + 2u).w)) * hit.weights;
+                vec2(corner(first + 2u).w, normal(first + 2u).w));
 }
 
+vec2 uv_of(Hit hit) { return corner_uvs(hit.id) * hit.weights; }
+
 // Level of detail of a texture of size `texels` for a pixel that covers a patch with sides of `footprint`
-// (m).
-float lod_of(vec2 texels, Hit hit, float footprint) {
+// (m); `uvs` are the texture coordinates of the triangle's corners.
+float lod_of(vec2 texels, mat3x2 uvs, Hit hit, float footprint) {
   uint first = 3u * (hit.id - 1u);
   vec3 ab = corner(first + 1u).xyz - corner(first).xyz;
   vec3 ac = corner(first + 2u).xyz - corner(first).xyz;
-  vec2 uv = vec2(corner(first).w, normal(first).w);
-  vec2 uv_ab = vec2(corner(first + 1u).w, normal(first + 1u).w) - uv;
-  vec2 uv_ac = vec2(corner(first + 2u).w, normal(first + 2u).w) - uv;
+  vec2 uv_ab = uvs[1] - uvs[0];
+  vec2 uv_ac = uvs[2] - uvs[0];
   float texel_area = abs(uv_ab.x * uv_ac.y - uv_ab.y * uv_ac.x) * texels.x * texels.y;
   float area = length(cross(ab, ac));
   return area > 0.0 ? max(0.0, log2(footprint * sqrt(texel_area / area))) : 0.0;
 }
 
 float texture_lod(Hit hit, float footprint) {
-  return lod_of(vec2(textureSize(s_colour_maps, 0).xy), hit, footprint);
+  return lod_of(vec2(textureSize(s_colour_maps, 0).xy), corner_uvs(hit.id), hit, footprint);
 }
 
 // Whether the texture's alpha at the hit is below the material's cutoff; `footprint` is the side (m) of a

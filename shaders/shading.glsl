@@ -57,8 +57,21 @@ vec3 lamp_reflection(vec3 diffuse, vec3 f0, float specular, float roughness, vec
   return nl * ((1.0 - fresnel) * diffuse + a2 / (peak * peak) * 0.5 / visible * fresnel);
 }
 
-// Shades a surface in the room light, seen from direction d_view; n is the normal on that side.
-vec3 shaded(SurfaceMaterial surface, vec3 n, vec3 d_view) {
+// The clear layer over the colour of what is below it: GGX with roughness of its own, and Schlick's term for glass
+// at the angle of the view (glTF's KHR_materials_clearcoat).
+vec3 coated(vec3 below, SurfaceMaterial surface, vec3 d_view) {
+  vec3 n = surface.n_coat;
+  vec3 mirrored = surface.occlusion * specular_soft_light(vec3(1), surface.coat_roughness, n, d_view);
+  for (int i = 0; i < u_lamp_count; ++i)
+    mirrored += u_lamps[i].rgb *
+                lamp_reflection(vec3(0), vec3(1), 1.0, surface.coat_roughness, n, d_view, u_d_lamps[i].xyz);
+  float x = 1.0 - abs(dot(n, d_view));
+  return mix(below, mirrored, surface.coat * (0.04 + 0.96 * x * x * x * x * x));
+}
+
+// Shades a surface in the room light, seen from direction d_view; its normals are those on that side.
+vec3 shaded(SurfaceMaterial surface, vec3 d_view) {
+  vec3 n = surface.n;
   float specular = surface.is_diffuse ? 0.0 : 1.0;
   vec3 diffuse = surface.base * (1.0 - surface.metallic), f0 = mix(vec3(0.04), surface.base, surface.metallic);
   vec3 colour = (1.0 - specular * f0) * diffuse * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
@@ -67,14 +80,25 @@ vec3 shaded(SurfaceMaterial surface, vec3 n, vec3 d_view) {
   for (int i = 0; i < u_lamp_count; ++i)
     colour += u_lamps[i].rgb *
               lamp_reflection(diffuse, f0, specular, surface.roughness, n, d_view, u_d_lamps[i].xyz);
-  return colour + surface.emitted;
+  colour += surface.emitted;
+#ifdef CLEARCOAT
+  if (surface.coat > 0.0) colour = coated(colour, surface, d_view);
+#endif
+  return colour;
+}
+
+// The surface with its normals on the side (1, -1) of the mesh's, and turned to the viewer, who looks along d.
+SurfaceMaterial turned_to_viewer(SurfaceMaterial surface, float side, vec3 d) {
+  surface.n = turned_to_viewer(side * surface.n, d);
+  surface.n_coat = turned_to_viewer(side * surface.n_coat, d);
+  return surface;
 }
 
 // Colour seen along the ray direction d; `footprint` is the side (m) of the pixel's patch on the surface.
 vec3 radiance_along(vec3 d, Hit hit, float footprint) {
   if (is_unlit(hit)) return base_colour(hit, footprint);
   SurfaceMaterial surface = surface_material_at(hit, footprint);
-  return shaded(surface, turned_to_viewer(facing_sign(surface.n_smooth, hit, d) * surface.n, d), -d);
+  return shaded(turned_to_viewer(surface, facing_sign(surface.n_smooth, hit, d), d), -d);
 }
 
 // Colour of a part that lies on the surface. It is the same for every viewer: shaded as seen along the
@@ -83,8 +107,8 @@ vec3 radiance_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
   if (is_unlit(hit)) return base_colour(hit, footprint);
   SurfaceMaterial surface = surface_material_at(hit, footprint);
   float side = dot(surface.n_smooth, d_prototype_normal) < 0.0 ? -1.0 : 1.0;
-  vec3 n = turned_to_viewer(side * surface.n, -d_prototype_normal);
-  if (u_has_room_light) return shaded(surface, n, d_prototype_normal);
-  vec3 light = surface.occlusion * u_soft_above.rgb + u_lamps[0].rgb * dot(n, d_prototype_normal);
+  surface = turned_to_viewer(surface, side, -d_prototype_normal);
+  if (u_has_room_light) return shaded(surface, d_prototype_normal);
+  vec3 light = surface.occlusion * u_soft_above.rgb + u_lamps[0].rgb * dot(surface.n, d_prototype_normal);
   return surface.base * light + surface.emitted;
 }

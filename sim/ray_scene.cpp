@@ -232,6 +232,14 @@ Eigen::Vector2f RayScene::uv(const Hit& hit) const {
   return (1 - u - v) * uvs[c[0]] + u * uvs[c[1]] + v * uvs[c[2]];
 }
 
+Eigen::Vector2f RayScene::second_uv(const Hit& hit) const {
+  const auto& uvs = impl_->placed[static_cast<std::size_t>(hit.object)].mesh->second_uvs;
+  if (uvs.empty()) return Eigen::Vector2f::Zero();
+  const auto& c = impl_->corners(hit);
+  const float u = hit.barycentric.x(), v = hit.barycentric.y();
+  return (1 - u - v) * uvs[c[0]] + u * uvs[c[1]] + v * uvs[c[2]];
+}
+
 Eigen::Vector3f RayScene::colour(const Hit& hit) const {
   const auto& colours = impl_->placed[static_cast<std::size_t>(hit.object)].mesh->colours;
   if (colours.empty()) return Eigen::Vector3f::Ones();

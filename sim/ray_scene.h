@@ -63,6 +63,8 @@ class RayScene {
   Eigen::Vector3d mapped_normal(const Hit& hit, const Eigen::Vector3d& along) const;
   /// Texture coordinates interpolated from the mesh; zero when it has none.
   Eigen::Vector2f uv(const Hit& hit) const;
+  /// The same for the mesh's second texture coordinates.
+  Eigen::Vector2f second_uv(const Hit& hit) const;
   /// Linear RGB interpolated from the mesh's colours; ones when it has none.
   Eigen::Vector3f colour(const Hit& hit) const;
 

@@ -105,12 +105,12 @@ const std::array<Eigen::Vector2d, k_directions>& slopes() {
 }
 
 // The reflected soft light, by importance sampling of GGX half vectors.
-Vector3d specular_soft_light(const SurfaceMaterial& material,
+Vector3d specular_soft_light(double roughness,
                              const Vector3d& f0,
                              const Vector3d& n,
                              const Vector3d& d_view,
                              const scene::RoomLight& room) {
-  const double alpha = std::pow(std::max(material.roughness, k_least_roughness), 2);
+  const double alpha = std::pow(std::max(roughness, k_least_roughness), 2);
   const double nv = std::max(1e-4, n.dot(d_view));
   const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
   Vector3d sum = Vector3d::Zero();
@@ -124,6 +124,24 @@ Vector3d specular_soft_light(const SurfaceMaterial& material,
     sum += soft_from(room, d).cwiseProduct(fresnel(f0, vh)) * (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
   }
   return sum / k_directions;
+}
+
+// What a clear layer mirrors where it mirrors everything: soft light and lamps, by GGX alone.
+Vector3d mirrored_by_coat(const SurfaceMaterial& material,
+                          const Vector3d& n,
+                          const Vector3d& d_view,
+                          const scene::RoomLight& room) {
+  const double nv = std::max(1e-4, n.dot(d_view));
+  const double alpha = std::pow(std::max(material.coat_roughness, k_lamp_roughness), 2);
+  Vector3d sum =
+      material.occlusion * specular_soft_light(material.coat_roughness, Vector3d::Ones(), n, d_view, room);
+  for (const scene::RoomLight::Lamp& lamp : room.lamps) {
+    const double nl = n.dot(lamp.d_world);
+    if (nl <= 0) continue;
+    const Vector3d h = (d_view + lamp.d_world).normalized();
+    sum += nl * std::numbers::pi * ggx(n.dot(h), alpha) * visibility(nl, nv, alpha) * bgr(lamp.strength_rgb);
+  }
+  return sum;
 }
 
 }  // namespace
@@ -141,7 +159,8 @@ PartsLight PartsLight::beside(const Imager& viewer) {
 Vector3d shaded(const SurfaceMaterial& material,
                 const Vector3d& n,
                 const Vector3d& d_view,
-                const scene::RoomLight& room) {
+                const scene::RoomLight& room,
+                const std::optional<Vector3d>& n_coat) {
   const Vector3d diffuse = (1 - material.metallic) * material.base;
   const Vector3d f0 =
       (1 - material.metallic) * Vector3d::Constant(k_dielectric) + material.metallic * material.base;
@@ -150,7 +169,8 @@ Vector3d shaded(const SurfaceMaterial& material,
   Vector3d soft = diffuse.cwiseProduct(soft_on(room, n)), by_lamps = Vector3d::Zero();
   if (!material.is_diffuse) {
     const Vector3d mean = f0 + (Vector3d::Ones() - f0) * mean_schlick(nv);
-    soft = soft.cwiseProduct(Vector3d::Ones() - mean) + specular_soft_light(material, f0, n, d_view, room);
+    soft = soft.cwiseProduct(Vector3d::Ones() - mean) +
+           specular_soft_light(material.roughness, f0, n, d_view, room);
   }
   for (const scene::RoomLight::Lamp& lamp : room.lamps) {
     const double nl = n.dot(lamp.d_world);
@@ -164,7 +184,13 @@ Vector3d shaded(const SurfaceMaterial& material,
     }
     by_lamps += nl * reflected.cwiseProduct(bgr(lamp.strength_rgb));
   }
-  return material.occlusion * soft + by_lamps + material.emitted;
+  const Vector3d below = material.occlusion * soft + by_lamps + material.emitted;
+  if (material.coat <= 0) return below;
+  // The layer's share of mirrored light is that of glass at the angle of the view; it darkens what is below.
+  const Vector3d& n_layer = n_coat.value_or(n);
+  const double share =
+      material.coat * (k_dielectric + (1 - k_dielectric) * schlick(std::abs(n_layer.dot(d_view))));
+  return (1 - share) * below + share * mirrored_by_coat(material, n_layer, d_view, room);
 }
 
 }  // namespace limn::sim

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "core/imager.h"
 #include "scene/room_light.h"
@@ -18,12 +19,13 @@ struct PartsLight {
   static PartsLight beside(const Imager& viewer);
 };
 
-/// The colour of a surface seen from direction d_view, linear BGR; n is its unit normal on the viewer's side.
-/// Uses the metallic-roughness material of glTF 2.0 (appendix B); the reflected soft light is a sum over
-/// directions.
+/// The colour of a surface seen from direction d_view, linear BGR; n is its unit normal on the viewer's side,
+/// and n_coat that of its clear layer (absent: n). Uses the metallic-roughness material of glTF 2.0 (appendix
+/// B); the reflected soft light is a sum over directions.
 Eigen::Vector3d shaded(const SurfaceMaterial& material,
                        const Eigen::Vector3d& n,
                        const Eigen::Vector3d& d_view,
-                       const scene::RoomLight& room);
+                       const scene::RoomLight& room,
+                       const std::optional<Eigen::Vector3d>& n_coat = {});
 
 }  // namespace limn::sim

@@ -132,17 +132,23 @@ bool ReferenceRenderer::is_hidden(const Nearest& nearest, const Ray& ray, const 
   return (nearest.hit.distance - behind.distance) * cosine > (on_surface ? k_on_surface : 0);
 }
 
+SurfaceMaterial ReferenceRenderer::material_at(const Part& part, const Hit& hit) {
+  return surface_material(*part.mesh, hit.triangle, part.rays.uv(hit), part.rays.colour(hit),
+                          part.rays.second_uv(hit));
+}
+
 Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
                                                   const Nearest& nearest,
                                                   const PartsLight& light) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial material = surface_material(*part.mesh, nearest.hit.triangle,
-                                                    part.rays.uv(nearest.hit), part.rays.colour(nearest.hit));
+  const SurfaceMaterial material = material_at(part, nearest.hit);
   if (material.is_unlit) return material.base.cast<float>();
   const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
   const double side = part.rays.shading_normal(nearest.hit).dot(face) < 0 ? -1 : 1;
-  const Eigen::Vector3d n = turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, material.along), d);
-  return shaded(material, n, -d, light.room).cast<float>();
+  const auto turned = [&](const Eigen::Vector3d& along) {
+    return turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, along), d);
+  };
+  return shaded(material, turned(material.along), -d, light.room, turned(material.coat_along)).cast<float>();
 }
 
 // If no room light is known, the light comes along the prototype's normal and nothing is reflected
@@ -150,13 +156,15 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
 Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
                                                        const Eigen::Vector3d& d_normal) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  const SurfaceMaterial material = surface_material(*part.mesh, nearest.hit.triangle,
-                                                    part.rays.uv(nearest.hit), part.rays.colour(nearest.hit));
+  const SurfaceMaterial material = material_at(part, nearest.hit);
   if (material.is_unlit) return material.base.cast<float>();
   const double side = part.rays.shading_normal(nearest.hit).dot(d_normal) < 0 ? -1 : 1;
-  const Eigen::Vector3d n =
-      turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, material.along), -d_normal);
-  if (light_.is_room_light) return shaded(material, n, d_normal, light_.room).cast<float>();
+  const auto turned = [&](const Eigen::Vector3d& along) {
+    return turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, along), -d_normal);
+  };
+  const Eigen::Vector3d n = turned(material.along);
+  if (light_.is_room_light)
+    return shaded(material, n, d_normal, light_.room, turned(material.coat_along)).cast<float>();
   const Eigen::Vector3d light = material.occlusion * light_.room.above_rgb.reverse() +
                                 n.dot(d_normal) * light_.room.lamps[0].strength_rgb.reverse();
   return (material.base.cwiseProduct(light) + material.emitted).cast<float>();

@@ -65,6 +65,7 @@ class ReferenceRenderer {
   template <class SampleAt>
   static PartImage averaged(const Imager& imager, const SampleAt& sample_at);
 
+  static SurfaceMaterial material_at(const Part& part, const Hit& hit);
   Nearest nearest_part(const Ray& ray) const;
   bool is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const;
   Eigen::Vector3f radiance_along(const Eigen::Vector3d& d,

@@ -93,9 +93,19 @@ Eigen::Vector3f material_albedo(const scene::Mesh& mesh,
 SurfaceMaterial surface_material(const scene::Mesh& mesh,
                                  int triangle,
                                  const Eigen::Vector2f& uv,
-                                 const Eigen::Vector3f& colour_rgb) {
+                                 const Eigen::Vector3f& colour_rgb,
+                                 const Eigen::Vector2f& second_uv) {
   const scene::Material& material = material_of(mesh, triangle);
   const scene::SurfaceMaps& maps = material.maps;
+  const auto numbers_at = [&](const scene::Texture& map) {
+    return between_texels(map.image, map.in_second_uvs ? second_uv : uv, repeated_numbers);
+  };
+  // The normal of a map of normals, relative to the mesh's.
+  const auto relief_at = [&](const scene::Texture& map, float map_scale) {
+    const auto scale = static_cast<double>(map_scale);
+    const Eigen::Vector3d around = 2 * numbers_at(map).reverse().cast<double>() - Eigen::Vector3d::Ones();
+    return Eigen::Vector3d(around.cwiseProduct(Eigen::Vector3d(scale, scale, 1)));
+  };
   SurfaceMaterial found;
   found.base = material_albedo(mesh, triangle, uv, colour_rgb).cast<double>();
   found.is_unlit = material.unlit;
@@ -106,22 +116,29 @@ SurfaceMaterial surface_material(const scene::Mesh& mesh,
   found.emitted = material.emitted.reverse().cast<double>();
   found.along = Eigen::Vector3d::UnitZ();
   if (!maps.metallic_roughness.image.empty()) {
-    const Eigen::Vector3f numbers = between_texels(maps.metallic_roughness.image, uv, repeated_numbers);
+    const Eigen::Vector3f numbers = numbers_at(maps.metallic_roughness);
     found.metallic *= static_cast<double>(numbers[0]);
     found.roughness *= static_cast<double>(numbers[1]);
   }
   if (!maps.occlusion.image.empty()) {
-    const auto red = static_cast<double>(between_texels(maps.occlusion.image, uv, repeated_numbers)[2]);
+    const auto red = static_cast<double>(numbers_at(maps.occlusion)[2]);
     found.occlusion = 1 - static_cast<double>(maps.occlusion_strength) * (1 - red);
   }
   if (!maps.emission.image.empty())
-    found.emitted.array() *= between_texels(maps.emission.image, uv, repeated_texel).cast<double>().array();
-  if (!maps.normals.image.empty() && !mesh.tangents.empty()) {
-    const Eigen::Vector3f numbers = between_texels(maps.normals.image, uv, repeated_numbers);
-    const auto scale = static_cast<double>(maps.normal_scale);
-    const Eigen::Vector3d around = 2 * numbers.reverse().cast<double>() - Eigen::Vector3d::Ones();
-    found.along = around.cwiseProduct(Eigen::Vector3d(scale, scale, 1));
-  }
+    found.emitted.array() *=
+        between_texels(maps.emission.image, maps.emission.in_second_uvs ? second_uv : uv, repeated_texel)
+            .cast<double>()
+            .array();
+  const bool has_tangents = !mesh.tangents.empty();
+  if (!maps.normals.image.empty() && has_tangents) found.along = relief_at(maps.normals, maps.normal_scale);
+  const scene::Clearcoat& coat = material.coat;
+  found.coat = static_cast<double>(coat.factor);
+  found.coat_roughness = static_cast<double>(coat.roughness);
+  if (!coat.factor_map.image.empty()) found.coat *= static_cast<double>(numbers_at(coat.factor_map)[2]);
+  if (!coat.roughness_map.image.empty())
+    found.coat_roughness *= static_cast<double>(numbers_at(coat.roughness_map)[1]);
+  if (!coat.normals.image.empty() && has_tangents)
+    found.coat_along = relief_at(coat.normals, coat.normal_scale);
   return found;
 }
 

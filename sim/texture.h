@@ -31,10 +31,15 @@ struct SurfaceMaterial {
   Eigen::Vector3d emitted;  ///< Emitted light, linear BGR.
   Eigen::Vector3d along;  ///< Normal from the normal map: components along tangent, bitangent and the mesh's
                           ///< normal; not of unit length.
+  double coat = 0,
+         coat_roughness = 0;  ///< The clear layer (KHR_materials_clearcoat): its share, its roughness.
+  Eigen::Vector3d coat_along = Eigen::Vector3d::UnitZ();  ///< As `along`, for the clear layer.
 };
+/// `second_uv`: the place in the mesh's second texture coordinates (RayScene::second_uv).
 SurfaceMaterial surface_material(const scene::Mesh& mesh,
                                  int triangle,
                                  const Eigen::Vector2f& uv,
-                                 const Eigen::Vector3f& colour_rgb = Eigen::Vector3f::Ones());
+                                 const Eigen::Vector3f& colour_rgb = Eigen::Vector3f::Ones(),
+                                 const Eigen::Vector2f& second_uv = Eigen::Vector2f::Zero());
 
 }  // namespace limn::sim

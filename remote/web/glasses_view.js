@@ -3,7 +3,8 @@
 // behind it meets lit prototype, because light shows it there (the rule of shaders/part_coverage.glsl).
 import { GlassesCamera } from "/glasses_camera.js";
 import { product, read_glb } from "/glb.js";
-import { delete_mesh, k_shading, make_program, upload_mesh } from "/mesh_gl.js";
+import { delete_mesh, make_program, upload_mesh } from "/mesh_gl.js";
+import { bind_material, k_material, k_material_inputs } from "/mesh_material.js";
 
 const k_near = 0.05,
   k_far = 20, // m
@@ -16,16 +17,14 @@ const k_moved = 2e-4; // shadows are drawn again when the prototype has moved by
 
 const k_vertex = `#version 300 es
 uniform mat4 u_world_from_model, u_view_from_world, u_clip_from_view;
-in vec3 a_position, a_normal;
-in vec2 a_uv;
-out vec3 v_normal, v_position, v_world;
-out vec2 v_uv;
+in vec3 a_position;
+out vec3 v_position, v_world;
+${k_material_inputs}
 void main() {
   vec4 p_world = u_world_from_model * vec4(a_position, 1), p_view = u_view_from_world * p_world;
   v_world = p_world.xyz;
   v_position = p_view.xyz;
-  v_normal = mat3(u_view_from_world) * mat3(u_world_from_model) * a_normal;
-  v_uv = a_uv;
+  pass_material(mat3(u_view_from_world) * mat3(u_world_from_model));
   gl_Position = u_clip_from_view * p_view;
 }`;
 
@@ -69,9 +68,7 @@ void main() {
 const k_part_fragment = `#version 300 es
 precision highp float;
 precision highp sampler2DArray;
-uniform vec4 u_base;
-uniform sampler2D u_texture;
-uniform float u_unlit, u_cut_below;
+uniform float u_cut_below;
 uniform bool u_rest, u_on_surface, u_has_prototype;
 uniform sampler2D s_place, s_prototype, s_depth;
 uniform sampler2DArray s_depths;
@@ -81,10 +78,9 @@ uniform vec2 u_depth_range; // near and far plane of a depth buffer, m
 uniform mat4 u_clip_from_view, u_depth_from_view;
 uniform ivec2 u_corner;
 uniform vec2 u_size;
-in vec3 v_normal, v_position;
-in vec2 v_uv;
+in vec3 v_position;
 out vec4 o_colour;
-${k_shading}
+${k_material}
 const float k_on_surface = 0.002, k_same_place = 1e-4; // m, as in Limn's shaders
 const float k_nearer = 0.03; // m; a hand is nearer than what it hides by more than the depth sensor's noise
 // Distance of real things from the eye's plane, m; 0: not measured there.
@@ -97,7 +93,7 @@ float real_depth(vec2 px) {
   return raw.r > 0.0 ? u_depth_range.x / max(1.0 - raw.r * (1.0 - u_depth_range.x / u_depth_range.y), 1e-6) : 0.0;
 }
 void main() {
-  vec4 texel = texture(u_texture, v_uv);
+  vec4 texel = material_texel();
   if (texel.a < u_cut_below) discard;
   ivec2 px = ivec2(gl_FragCoord.xy) - u_corner;
   float depth = u_has_prototype ? texelFetch(s_prototype, px, 0).r : 1.0, z_behind = 1e6;
@@ -117,8 +113,7 @@ void main() {
     o_colour = vec4(0);
     return;
   }
-  vec3 base = u_base.rgb * texel.rgb;
-  vec3 linear = mix(shaded(base, normalize(v_normal), normalize(-v_position)), base, u_unlit);
+  vec3 linear = material_light(texel, normalize(-v_position));
   o_colour = vec4(pow(clamp(linear, 0.0, 1.0), vec3(1.0 / 2.2)), 1);
 }`;
 
@@ -702,19 +697,15 @@ export class GlassesView {
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.uniform1i(at(name), unit);
     }
-    gl.activeTexture(gl.TEXTURE0);
-    gl.uniform1i(at("u_texture"), 0);
     for (const [slot, variant, pose, where] of parts) {
       const world_from_part = matrix_of(pose);
       const chosen = override_of(slots.find(({ name }) => name === slot)?.material);
       gl.uniform1i(at("u_on_surface"), where === "surface");
       for (const mesh of this.#meshes.of(`/glasses/part/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.glb`)) {
         gl.uniformMatrix4fv(at("u_world_from_model"), false, product(world_from_part, mesh.matrix));
-        gl.uniform4fv(at("u_base"), chosen ? [...chosen, 1] : mesh.base);
-        gl.uniform1f(at("u_unlit"), mesh.is_unlit ? 1 : 0);
+        bind_material(gl, at, mesh, chosen ? [...chosen, 1] : mesh.base);
         gl.uniform1f(at("u_cut_below"), mesh.cut_below);
         gl.bindVertexArray(mesh.array);
-        gl.bindTexture(gl.TEXTURE_2D, mesh.texture);
         gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
       }
     }

@@ -1,4 +1,5 @@
-// Reads binary glTF 2.0, as far as Limn writes it: triangles with positions, normals, base colours and textures, in nodes with transforms.
+// Reads binary glTF 2.0, as far as Limn writes it: triangles with positions, normals, tangents, two sets of uvs and
+// materials, in nodes with transforms.
 
 const k_magic = 0x46546c67,
   k_json = 0x4e4f534a,
@@ -80,11 +81,10 @@ function normals_of(positions, indices) {
   return normals;
 }
 
-// Returns a material's texture; each image is decoded only once.
-function texture_of(gltf, bin, material, decoded) {
-  const index = material?.baseColorTexture?.index;
-  if (index === undefined) return null;
-  const { source } = gltf.textures[index],
+// Returns the image of a material's texture; each is decoded only once.
+function texture_of(gltf, bin, use, decoded) {
+  if (use?.index === undefined) return null;
+  const { source } = gltf.textures[use.index],
     image = gltf.images[source];
   const view = gltf.bufferViews[image.bufferView],
     at = view.byteOffset ?? 0;
@@ -96,14 +96,48 @@ function texture_of(gltf, bin, material, decoded) {
   return decoded.get(source);
 }
 
+// Returns the factors and maps of a material besides its colour, as members of a mesh.
+async function material_of(gltf, bin, material, decoded) {
+  const surface = material?.pbrMetallicRoughness,
+    extensions = material?.extensions ?? {},
+    layer = extensions.KHR_materials_clearcoat ?? {},
+    strength = extensions.KHR_materials_emissive_strength?.emissiveStrength ?? 1;
+  const uses = {
+    metallic_roughness: surface?.metallicRoughnessTexture,
+    normals: material?.normalTexture,
+    emission: material?.emissiveTexture,
+    coat: layer.clearcoatTexture,
+    coat_roughness: layer.clearcoatRoughnessTexture,
+    coat_normals: layer.clearcoatNormalTexture,
+  };
+  const maps = {};
+  for (const [name, use] of Object.entries(uses))
+    if (use)
+      maps[name] = {
+        picture: await texture_of(gltf, bin, use, decoded),
+        set: use.texCoord === 1 ? 1 : 0,
+        scale: use.scale ?? 1,
+      };
+  return {
+    maps,
+    metallic: surface?.metallicFactor ?? 1,
+    roughness: surface?.roughnessFactor ?? 1,
+    emitted: (material?.emissiveFactor ?? [0, 0, 0]).map((value) => value * strength),
+    coat: layer.clearcoatFactor ?? 0,
+    coat_roughness: layer.clearcoatRoughnessFactor ?? 0,
+  };
+}
+
 /**
- * Returns the meshes [{name, matrix, positions, normals, uvs, indices, base, texture, cut_below, is_unlit}] of a file's scene. `base` is
+ * Returns the meshes [{name, matrix, positions, normals, tangents, uvs, second_uvs, indices, base, texture, cut_below, is_unlit, metallic,
+ * roughness, emitted, coat, coat_roughness, maps}] of a file's scene. `maps` are {picture, set, scale} by name; `base` is
  * linear RGBA; where the texture's alpha is below `cut_below` the surface has holes; uvs and texture (a bitmap) may be null. Throws an Error whose message can be shown.
  */
 export async function read_glb(buffer) {
   const [gltf, bin] = chunks_of(buffer);
   const meshes = [],
     decoded = new Map();
+  const numbers_or_null = (index) => (index === undefined ? null : numbers_of(gltf, bin, index));
   const visit = (index, parent, above) => {
     const node = gltf.nodes[index],
       matrix = product(parent, matrix_of(node)),
@@ -115,7 +149,7 @@ export async function read_glb(buffer) {
         primitive.indices === undefined
           ? Uint32Array.from({ length: positions.length / 3 }, (_, i) => i)
           : Uint32Array.from(numbers_of(gltf, bin, primitive.indices));
-      const { NORMAL: normal, TEXCOORD_0: uv } = primitive.attributes,
+      const { NORMAL: normal, TANGENT: tangent, TEXCOORD_0: uv, TEXCOORD_1: second_uv } = primitive.attributes,
         whole = gltf.materials?.[primitive.material];
       const material = whole?.pbrMetallicRoughness;
       meshes.push({
@@ -125,8 +159,11 @@ export async function read_glb(buffer) {
         indices,
         base: material?.baseColorFactor ?? [1, 1, 1, 1],
         normals: normal === undefined ? normals_of(positions, indices) : numbers_of(gltf, bin, normal),
-        uvs: uv === undefined ? null : numbers_of(gltf, bin, uv),
-        texture: texture_of(gltf, bin, material, decoded),
+        tangents: numbers_or_null(tangent),
+        uvs: numbers_or_null(uv),
+        second_uvs: numbers_or_null(second_uv),
+        texture: texture_of(gltf, bin, material?.baseColorTexture, decoded),
+        material: whole,
         cut_below: whole?.alphaMode === "MASK" ? (whole.alphaCutoff ?? 0.5) : 0,
         is_unlit: whole?.extensions?.KHR_materials_unlit !== undefined,
       });
@@ -135,6 +172,9 @@ export async function read_glb(buffer) {
   };
   const identity = new Float32Array([1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
   for (const root of gltf.scenes[gltf.scene ?? 0].nodes) visit(root, identity, "");
-  for (const mesh of meshes) mesh.texture = await mesh.texture;
+  for (const mesh of meshes) {
+    mesh.texture = await mesh.texture;
+    Object.assign(mesh, await material_of(gltf, bin, mesh.material, decoded));
+  }
   return meshes;
 }

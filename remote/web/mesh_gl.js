@@ -1,15 +1,7 @@
-// What the 3D views share: programs, meshes on the GPU, and how a surface is shaded.
+// What the 3D views share: programs, and meshes on the GPU.
+import { upload_maps } from "/mesh_material.js";
 
-/** A GLSL function for `base` (linear) of a surface with normal n, seen along -eye, both in the view's frame. */
-export const k_shading = `
-vec3 shaded(vec3 base, vec3 n, vec3 eye) {
-  if (dot(n, eye) < 0.0) n = -n;
-  float key = max(dot(n, normalize(vec3(0.5, 0.8, 0.6))), 0.0), fill = 0.5 + 0.5 * n.y;
-  float rim = pow(1.0 - max(dot(n, eye), 0.0), 3.0);
-  return base * (0.16 + 0.22 * fill + 0.75 * key) + vec3(0.06) * rim;
-}`;
-
-const k_attributes = ["a_position", "a_normal", "a_uv"];
+const k_attributes = ["a_position", "a_normal", "a_uv", "a_second_uv", "a_tangent"];
 
 /** Compiles a program; its attributes are those of upload_mesh(). Throws an Error with the driver's message. */
 export function make_program(gl, vertex, fragment) {
@@ -30,7 +22,7 @@ export function make_program(gl, vertex, fragment) {
   return program;
 }
 
-/** A mesh of read_glb() on the GPU: its members, with `array`, `count` and `texture`. */
+/** A mesh of read_glb() on the GPU: its members, with `array`, `count`, `texture` and `map_textures`. */
 export function upload_mesh(gl, mesh) {
   const array = gl.createVertexArray();
   gl.bindVertexArray(array);
@@ -43,21 +35,25 @@ export function upload_mesh(gl, mesh) {
   attribute(0, mesh.positions, 3);
   attribute(1, mesh.normals, 3);
   if (mesh.uvs) attribute(2, mesh.uvs, 2);
+  if (mesh.second_uvs) attribute(3, mesh.second_uvs, 2);
+  if (mesh.tangents) attribute(4, mesh.tangents, 4);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
-  return { ...mesh, array, count: mesh.indices.length, texture: texture_of(gl, mesh.texture) };
+  const map_textures = mesh.maps ? upload_maps(mesh, (picture, is_colour) => texture_of(gl, picture, is_colour)) : [];
+  return { ...mesh, array, count: mesh.indices.length, texture: texture_of(gl, mesh.texture, true), map_textures };
 }
 
-// Makes a texture from an image, or from one white pixel.
-function texture_of(gl, picture) {
+// Makes a texture from an image, or from one white pixel. `is_colour`: it is sRGB.
+function texture_of(gl, picture, is_colour) {
+  const format = is_colour ? gl.SRGB8_ALPHA8 : gl.RGBA8;
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
-  if (picture) gl.texImage2D(gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, gl.RGBA, gl.UNSIGNED_BYTE, picture);
+  if (picture) gl.texImage2D(gl.TEXTURE_2D, 0, format, gl.RGBA, gl.UNSIGNED_BYTE, picture);
   else
     gl.texImage2D(
       gl.TEXTURE_2D,
       0,
-      gl.SRGB8_ALPHA8,
+      format,
       1,
       1,
       0,
@@ -71,7 +67,7 @@ function texture_of(gl, picture) {
 }
 
 /** Frees a mesh of upload_mesh(). */
-export function delete_mesh(gl, { array, texture }) {
+export function delete_mesh(gl, { array, texture, map_textures }) {
   gl.deleteVertexArray(array);
-  gl.deleteTexture(texture);
+  for (const each of [texture, ...map_textures]) gl.deleteTexture(each);
 }

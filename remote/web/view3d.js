@@ -1,33 +1,27 @@
 // An interactive 3D view of the parts in WebGL 2; it is drawn only after a change.
 import { product } from "/glb.js";
-import { delete_mesh, k_shading, make_program, upload_mesh } from "/mesh_gl.js";
+import { delete_mesh, make_program, upload_mesh } from "/mesh_gl.js";
+import { bind_material, k_material, k_material_inputs } from "/mesh_material.js";
 
 const k_vertex = `#version 300 es
 uniform mat4 u_view_from_model, u_clip_from_view;
-in vec3 a_position, a_normal;
-in vec2 a_uv;
-out vec3 v_normal, v_position;
-out vec2 v_uv;
+in vec3 a_position;
+out vec3 v_position;
+${k_material_inputs}
 void main() {
   vec4 p_view = u_view_from_model * vec4(a_position, 1);
   v_position = p_view.xyz;
-  v_normal = mat3(u_view_from_model) * a_normal;
-  v_uv = a_uv;
+  pass_material(mat3(u_view_from_model));
   gl_Position = u_clip_from_view * p_view;
 }`;
 const k_fragment = `#version 300 es
 precision highp float;
-uniform vec4 u_base;
-uniform sampler2D u_texture;
-uniform float u_glow, u_unlit;
-in vec3 v_normal, v_position;
-in vec2 v_uv;
+uniform float u_glow;
+in vec3 v_position;
 out vec4 o_colour;
-${k_shading}
+${k_material}
 void main() {
-  vec3 base = u_base.rgb * texture(u_texture, v_uv).rgb;
-  vec3 lit = shaded(base, normalize(v_normal), normalize(-v_position));
-  vec3 linear = mix(lit, base, u_unlit) + u_glow * vec3(0.35, 0.2, 0.04);
+  vec3 linear = material_light(material_texel(), normalize(-v_position)) + u_glow * vec3(0.35, 0.2, 0.04);
   o_colour = vec4(pow(linear, vec3(1.0 / 2.2)), 1);
 }`;
 const k_fov = (35 * Math.PI) / 180;
@@ -216,11 +210,9 @@ export class View3d {
     );
     for (const mesh of this.#meshes) {
       gl.uniformMatrix4fv(at("u_view_from_model"), false, product(view_from_world, mesh.matrix));
-      gl.uniform4fv(at("u_base"), mesh.base);
+      bind_material(gl, at, mesh);
       gl.uniform1f(at("u_glow"), this.#marked && mesh.name === this.#marked ? 1 : 0);
-      gl.uniform1f(at("u_unlit"), mesh.is_unlit ? 1 : 0);
       gl.bindVertexArray(mesh.array);
-      gl.bindTexture(gl.TEXTURE_2D, mesh.texture);
       gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
     }
     canvas.dataset.meshes = this.#meshes.length;

@@ -377,12 +377,12 @@ TEST(GltfMesh, ExtensionsThatAreNotReadAreNamed) {
   Gltf file = plate();
   file.root["extensionsRequired"] = {"ACME_secret_geometry"};
   EXPECT_TRUE(contains(error_of(file.glb()), "found ACME_secret_geometry. Switch ACME_secret_geometry off"));
-  Gltf coated = plate();
-  coated.primitive()["material"] = 0;
-  coated.root["materials"] =
-      json::array({{{"extensions", {{"KHR_materials_clearcoat", {{"clearcoatFactor", 1}}}}}}});
-  loaded(coated.glb());
-  EXPECT_TRUE(contains(g_messages, "its materials are shown without KHR_materials_clearcoat"));
+  Gltf velvet = plate();
+  velvet.primitive()["material"] = 0;
+  velvet.root["materials"] =
+      json::array({{{"extensions", {{"KHR_materials_sheen", {{"sheenRoughnessFactor", 1}}}}}}});
+  loaded(velvet.glb());
+  EXPECT_TRUE(contains(g_messages, "its materials are shown without KHR_materials_sheen"));
 }
 
 TEST(GltfMesh, DamagedFilesAreErrorsThatNameThem) {

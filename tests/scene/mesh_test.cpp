@@ -319,7 +319,7 @@ TEST(Mesh, MapsThatCannotBeReadAreToldAndLeftOut) {
   EXPECT_FALSE(loaded(R"("emissiveFactor":[1,1,1],)", "paint.png", &messages).emitted.isZero());
   EXPECT_EQ(messages, "");
   loaded(R"("normalTexture":{"index":1,"texCoord":1},)", "paint.png", &messages);
-  expect_messages({"'chrome'", "normal texture", "coordinates 1"});
+  expect_messages({"'chrome'", "coordinates of set 1", "triangles without"});
 }
 
 // textured_gltf with this mapping of its base colour texture. Its second texture coordinates are the
@@ -392,26 +392,42 @@ TEST(Mesh, TexturesLieInTheCoordinatesThatTheMaterialNames) {
   EXPECT_TRUE(test::near(uv_at(*mesh, 0, 1), Vector2d(0, 1), 1e-6));
 }
 
-TEST(Mesh, ATextureInAnotherPlaceThanTheFirstIsTold) {
+TEST(Mesh, TexturesOfAMaterialMayLieInTwoPlaces) {
   written("apart/paint.png", small_png());
-  const auto messages = [&](const std::string& base, const std::string& normal) {
+  std::string messages;
+  const auto loaded = [&](const std::string& base, const std::string& maps) {
     testing::internal::CaptureStderr();
-    const auto mesh = load_mesh(
-        written("apart/part.gltf",
-                placed_gltf(base, R"("name":"chrome","normalTexture":{"index":1,)" + normal + "},")),
-        LengthUnit::metre);
+    auto mesh = load_mesh(written("apart/part.gltf", placed_gltf(base, R"("name":"chrome",)" + maps)),
+                          LengthUnit::metre);
+    messages = testing::internal::GetCapturedStderr();
     EXPECT_TRUE(mesh) << mesh.message();
-    return testing::internal::GetCapturedStderr();
+    return mesh ? *mesh : Mesh{};
+  };
+  const auto normals = [](const std::string& place) {
+    return R"("normalTexture":{"index":1,)" + place + "},";
   };
   const std::string twice = moved(R"("scale":[2,2])");
-  EXPECT_EQ(messages(twice, twice), "");
-  EXPECT_EQ(messages(R"("texCoord":1)", R"("texCoord":1)"), "");
-  const std::string unmoved = messages(twice, R"("texCoord":0)");
-  for (const char* word : {"apart/part.gltf", "'chrome'", "normal texture", "KHR_texture_transform"})
-    EXPECT_NE(unmoved.find(word), std::string::npos) << word << " in: " << unmoved;
-  const std::string second = messages(R"("texCoord":0)", R"("texCoord":1)");
-  for (const char* word : {"'chrome'", "normal texture", "found coordinates 1"})
-    EXPECT_NE(second.find(word), std::string::npos) << word << " in: " << second;
+  for (const std::string& place : {twice, std::string(R"("texCoord":1)")}) {
+    const Mesh mesh = loaded(place, normals(place));
+    EXPECT_EQ(messages, "");
+    EXPECT_TRUE(mesh.second_uvs.empty());
+    EXPECT_FALSE(mesh.materials[mesh.triangle_materials[0]].maps.normals.in_second_uvs);
+  }
+  Mesh mesh = loaded(twice, normals(R"("texCoord":0)"));
+  EXPECT_EQ(messages, "");
+  ASSERT_EQ(mesh.second_uvs.size(), mesh.uvs.size());
+  EXPECT_TRUE(mesh.materials[mesh.triangle_materials[0]].maps.normals.in_second_uvs);
+  for (std::size_t i = 0; i < mesh.uvs.size(); ++i)  // v counts up
+    EXPECT_TRUE(test::near((mesh.uvs[i] - Eigen::Vector2f(0, 1)).cast<double>(),
+                           2 * (mesh.second_uvs[i] - Eigen::Vector2f(0, 1)).cast<double>(), 1e-5));
+  mesh = loaded(R"("texCoord":0)", normals(R"("texCoord":1)"));
+  EXPECT_EQ(messages, "");
+  mesh.uvs = mesh.second_uvs;
+  EXPECT_TRUE(test::near(uv_at(mesh, 1, 0), Vector2d(0, 0), 1e-6));
+  // The third is told.
+  loaded(twice, normals(R"("texCoord":1)") + R"("occlusionTexture":{"index":1,"texCoord":0},)");
+  for (const char* word : {"apart/part.gltf", "'chrome'", "occlusion texture", "third", "coordinates 0"})
+    EXPECT_NE(messages.find(word), std::string::npos) << word << " in: " << messages;
 }
 
 // placed_gltf with a normal map of the same mapping, and with normals and tangents in the file.

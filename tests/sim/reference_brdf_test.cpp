@@ -120,6 +120,57 @@ TEST(ReferenceBrdf, OcclusionKeepsSoftLightAloneAndEmissionIsAdded) {
                          shaded(open, k_up, tilted(-20), lamp_alone) + Vector3d(0.1, 0.2, 0.3), 1e-9));
 }
 
+TEST(ReferenceBrdf, AClearLayerMirrorsBesideWhatItDarkens) {
+  scene::RoomLight lamp, soft;
+  lamp.lamps = {{k_up, Vector3d::Constant(0.3)}};
+  SurfaceMaterial coated = material({0.2, 0.4, 0.8}, 0.5, 0.6);
+  coated.emitted = {0.3, 0.2, 0.1};
+  SurfaceMaterial bare = coated;
+  coated.coat = 0.5;
+  coated.coat_roughness = 0.5;
+  // Head-on, glass mirrors 4 %, and pi D V = 1 / (4 alpha^2) with alpha = 0.5^2 (as above).
+  EXPECT_TRUE(test::near(shaded(coated, k_up, k_up, lamp),
+                         0.98 * shaded(bare, k_up, k_up, lamp) + Vector3d::Constant(0.02 * 4 * 0.3), 1e-9));
+  // Soft light is that of a white metal of the layer's roughness and normal, at the share of its own angle.
+  soft.below_rgb = {0.05, 0.1, 0.2};
+  soft.above_rgb = {0.6, 0.5, 0.4};
+  coated.occlusion = bare.occlusion = 0.7;
+  const Vector3d d_view = tilted(60), n_coat = tilted(10);
+  const double share = 0.5 * (0.04 + 0.96 * std::pow(1 - n_coat.dot(d_view), 5));
+  const Vector3d mirrored = 0.7 * mirrored_by_rings(material({1, 1, 1}, 1, 0.5), n_coat, d_view, soft);
+  EXPECT_TRUE(test::near(shaded(coated, k_up, d_view, soft, n_coat),
+                         (1 - share) * shaded(bare, k_up, d_view, soft) + share * mirrored, 1e-3));
+}
+
+TEST(ReferenceBrdf, TexturesLieInTheCoordinatesOfTheirSet) {
+  scene::Mesh mesh;
+  mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.normals.assign(3, {0, 0, 1});
+  mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
+  mesh.second_uvs = {{0.75F, 0.25F}, {0.75F, 0.25F}, {0.75F, 0.25F}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.triangle_materials = {0};
+  const auto halves = [](const cv::Vec3b& left, const cv::Vec3b& right) {
+    cv::Mat image(2, 2, CV_8UC3);
+    image.col(0).setTo(left);
+    image.col(1).setTo(right);
+    return image;
+  };
+  scene::Material& material = mesh.materials[0];
+  material.coat = {.factor = 1, .roughness = 1};
+  material.coat.factor_map = {halves({0, 0, 51}, {0, 0, 204}), "", true};
+  material.coat.roughness_map = {halves({0, 51, 0}, {0, 204, 0}), "", false};
+  material.maps.occlusion = {halves({0, 0, 51}, {0, 0, 204}), "", true};
+  const std::array placed = {MeshInstance{&mesh, {}}};
+  const RayScene rays(placed);
+  const Hit hit = rays.first_hit({{0.25, 0.25, 1}, {0, 0, -1}});
+  const SurfaceMaterial found =
+      surface_material(mesh, hit.triangle, rays.uv(hit), rays.colour(hit), rays.second_uv(hit));
+  EXPECT_NEAR(found.coat, 0.8, 1e-6);
+  EXPECT_NEAR(found.coat_roughness, 0.2, 1e-6);
+  EXPECT_NEAR(found.occlusion, 0.8, 1e-6);
+}
+
 TEST(ReferenceBrdf, TexturesAndFactorsAreMultipliedAndRepeat) {
   scene::Mesh mesh;
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};

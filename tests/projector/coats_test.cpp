@@ -1,0 +1,162 @@
+// Clear layers and second texture coordinates, against the ray tracer.
+#include <cmath>
+#include <memory>
+#include <opencv2/core.hpp>
+
+#include "projector/composite_policy.h"
+#include "scene/tangents.h"
+#include "sim/reference_renderer.h"
+#include "tests/projector/judged_image.h"
+#include "tests/projector/sheet_room.h"
+#include "tests/support/matchers.h"
+
+namespace limn::projector {
+namespace {
+
+using CoatsTest = RendererTest;
+
+constexpr double k_side = 0.24, k_bow = 0.05;  // m
+
+// A texture from a function that gives red, green and blue (0 to 1) at u, v (up).
+scene::Texture painted(const std::function<Vector3d(double, double)>& rgb_at, bool in_second_uvs) {
+  constexpr int k_texels = 64;  // each covers more than two pixels
+  cv::Mat image(k_texels, k_texels, CV_8UC3);
+  for (int row = 0; row < k_texels; ++row)
+    for (int column = 0; column < k_texels; ++column) {
+      const Vector3d rgb = rgb_at((column + 0.5) / k_texels, 1 - (row + 0.5) / k_texels);
+      for (int c = 0; c < 3; ++c)
+        image.at<cv::Vec3b>(row, column)[2 - c] = cv::saturate_cast<std::uint8_t>(255 * rgb[c]);
+    }
+  return {image, "", in_second_uvs};
+}
+
+double wave(double turns) { return std::sin(2 * M_PI * turns); }
+
+scene::Texture relief(double waves, double slope, bool in_second_uvs) {
+  return painted(
+      [=](double u, double v) {
+        const Vector3d n = Vector3d(slope * wave(waves * u), slope * wave(waves * v), 1).normalized();
+        return Vector3d(0.5 * (n + Vector3d::Ones()));
+      },
+      in_second_uvs);
+}
+
+// A bowed sheet in front of the prototype, or lying on its flat middle (bow 0). Its second coordinates are
+// the first ones, turned and moved.
+Mesh panel(double z, double bow) {
+  Mesh mesh = test::grid(32, 2, [=](double u, double v) {
+    const double x = k_side * (u - 0.5);
+    return Vector3d(x, k_side * (v - 0.5), z + bow * std::pow(2 * x / k_side, 2));
+  });
+  mesh.normals.clear();
+  for (const auto& p : mesh.positions) {
+    const float slope = static_cast<float>(8 * bow / (k_side * k_side)) * p.x();
+    mesh.normals.push_back(Eigen::Vector3f(slope, 0, -1).normalized());
+    mesh.uvs.emplace_back(p.x() / static_cast<float>(k_side) + 0.5F,
+                          0.5F - p.y() / static_cast<float>(k_side));
+    mesh.second_uvs.emplace_back(mesh.uvs.back().y() + 0.25F, 1 - mesh.uvs.back().x());
+  }
+  return mesh;
+}
+
+// A lacquer all over which a second relief runs, on a base with a relief of its own.
+Mesh lacquered(double z, double bow) {
+  Mesh mesh = panel(z, bow);
+  scene::Material& material = mesh.materials[0];
+  material.base_colour = {0.5F, 0.08F, 0.05F};
+  material.metallic = 0.8F;
+  material.roughness = 0.6F;
+  material.emitted = {0.6F, 0.6F, 0.6F};
+  material.maps.metallic_roughness =
+      painted([](double u, double) { return Vector3d(0.2, 0.7 + 0.3 * u, 0.5); }, false);
+  material.maps.occlusion = painted([](double u, double) { return Vector3d(0.4 + 0.6 * u, 0, 0); }, true);
+  material.maps.normals = relief(2, 0.3, false);
+  material.maps.emission =
+      painted([](double u, double) { return Vector3d::Constant(0.3 + 0.3 * wave(u)).eval(); }, true);
+  material.coat.factor = 0.9F;
+  material.coat.roughness = 0.8F;
+  material.coat.factor_map =
+      painted([](double u, double) { return Vector3d(0.6 + 0.4 * wave(u), 0, 0); }, true);
+  material.coat.roughness_map =
+      painted([](double, double v) { return Vector3d(0, 0.3 + 0.5 * v, 0); }, false);
+  material.coat.normals = relief(3, 0.2, false);
+  material.coat.normal_scale = 0.7F;
+  scene::add_tangents(&mesh);
+  return mesh;
+}
+
+struct Room {
+  Rig rig = two_projectors();
+  scene::Scene scene;
+  PosedScene posed;
+  Imager viewer = viewer_from({-0.3, -0.3, -1.2});
+  sim::World world;
+};
+
+Room room_with(scene::Mode mode, Mesh part) {
+  Room room;
+  room.rig.projectors.pop_back();
+  room.scene = scene_of(sheet(0.5, 0.4), {slot("panel", mode, std::move(part))});
+  room.scene.light = scene::RoomLight{
+      k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
+  room.posed = posed_at_origin(room.scene);
+  room.world.rig = room.rig;
+  room.world.scene = room.scene;
+  sim::Object prototype;
+  prototype.name = "prototype";
+  prototype.mesh = std::make_shared<Mesh>(room.scene.prototype->mesh);
+  room.world.objects = {prototype};
+  return room;
+}
+
+TEST_F(CoatsTest, LightAndCompositesOfAClearLayerAreThoseOfTheRayTracer) {
+  for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
+    const bool on_surface = mode == scene::Mode::surface;
+    SCOPED_TRACE(on_surface ? "surface" : "view");
+    const Room room = room_with(mode, on_surface ? lacquered(-0.0005, 0) : lacquered(-0.08, k_bow));
+    Renderer drawing = renderer(room.scene, room.rig);
+    const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
+    const cv::Mat composite =
+        drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
+    const auto seen = agree(composite, judge.parts_image(room.rig.cameras[0]), 0, 15000);
+    EXPECT_TRUE(seen) << seen.message();
+    const auto lit =
+        agree(drawing.projector_image(0, room.posed, room.viewer), judge.projector_image(0), 2.2, 15000);
+    EXPECT_TRUE(lit) << lit.message();
+  }
+}
+
+// Each map has its own effect: without it, or in the other coordinates, the picture is another.
+TEST_F(CoatsTest, EveryMapOfAClearLayerIsSeenInItsOwnCoordinates) {
+  const Mesh whole = lacquered(-0.08, k_bow);
+  Room room = room_with(scene::Mode::view, whole);
+  using Texture = scene::Texture;
+  const std::function<Texture&(scene::Material*)> maps[] = {
+      [](scene::Material* m) -> Texture& { return m->coat.factor_map; },
+      [](scene::Material* m) -> Texture& { return m->coat.roughness_map; },
+      [](scene::Material* m) -> Texture& { return m->coat.normals; },
+      [](scene::Material* m) -> Texture& { return m->maps.occlusion; },
+      [](scene::Material* m) -> Texture& { return m->maps.emission; },
+      [](scene::Material* m) -> Texture& { return m->maps.normals; },
+      [](scene::Material* m) -> Texture& { return m->maps.metallic_roughness; }};
+  std::vector<scene::Variant>& variants = room.scene.slots[0].variants;
+  for (const auto& map : maps) {
+    Mesh without = whole, elsewhere = whole;
+    map(&without.materials[0]).image = cv::Mat();
+    Texture& other = map(&elsewhere.materials[0]);
+    other.in_second_uvs = !other.in_second_uvs;
+    variants.push_back({fmt::format("without map {}", &map - maps), without});
+    variants.push_back({fmt::format("map {} elsewhere", &map - maps), elsewhere});
+  }
+  Renderer drawing = renderer(room.scene, room.rig);
+  const auto composite = [&](const std::string& variant) {
+    room.posed.parts[0].variant = variant;
+    return drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
+  };
+  const cv::Mat wanted = composite("a");
+  for (std::size_t i = 1; i < variants.size(); ++i)
+    EXPECT_GT(cv::norm(composite(variants[i].name), wanted, cv::NORM_INF), 8) << variants[i].name;
+}
+
+}  // namespace
+}  // namespace limn::projector
