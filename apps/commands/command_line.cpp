@@ -81,6 +81,7 @@ int run_arguments(int argc, char** argv) {
   add_scan(app, run);
   add_recheck(app, run);
   add_align(app, run);
+  add_deviation(app, run);
   add_render(app, run);
   add_export(app, run);
   add_import(app, run);

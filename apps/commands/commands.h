@@ -27,6 +27,7 @@ void add_calibrate(CLI::App& app, Run& run);
 void add_scan(CLI::App& app, Run& run);
 void add_recheck(CLI::App& app, Run& run);
 void add_align(CLI::App& app, Run& run);
+void add_deviation(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
 void add_import(CLI::App& app, Run& run);

@@ -4,6 +4,7 @@
 #include "apps/align.h"
 #include "apps/commands/commands.h"
 #include "apps/commands/options.h"
+#include "apps/deviation.h"
 #include "apps/recheck.h"
 #include "apps/scan.h"
 
@@ -169,6 +170,89 @@ void add_align(CLI::App& app, Run& run) {
   command->add_option("--out", options->out, "Folder to write")->type_name("FOLDER")->required();
   command->add_flag("--json", options->json, "Print align.json instead of a line");
   command->callback([options, &run] { run = [options] { return report_result(run_align(*options)); }; });
+}
+
+void add_deviation(CLI::App& app, Run& run) {
+  auto* command = app.add_subcommand(
+      "deviation",
+      "Compare the scan of the prototype with its CAD: where is it proud or shy of it, and how sure is that");
+  command->footer(
+      "Aligns the CAD to the scan as limn align does; large deviations do not pull the alignment. Measures "
+      "the "
+      "distance\n"
+      "along the CAD's normals, positive where the prototype is proud of the CAD, with a standard deviation "
+      "for "
+      "each\n"
+      "point. Writes deviation.html (one file, for people), deviation.ply, deviation.csv, deviation.json and "
+      "poses.json.\n"
+      "What the scan does not show is not measured; nothing is filled in. It needs no rig.\n"
+      "Example: limn deviation --scan scan --cad door.glb --units m --out deviation\n"
+      "Example: limn deviation --scan scan/mesh.ply --cad door.stl --units mm --tolerance 0.3 --out "
+      "deviation\n"
+      "Example: limn deviation --scan scan --cad door.stl --units mm --fit -50,-80,0,120,40,60 --out handle\n"
+      "Example: limn deviation --scan scan --cad door.glb --units m --start aligned/align.json --no-align "
+      "--out "
+      "deviation");
+  auto options = std::make_shared<DeviationCommand>();
+  wizard::AlignOptions& align = options->files.align;
+  command->add_option("--scan", align.scan, "Scan: a PLY file with triangles, or the folder of limn scan")
+      ->type_name("SCAN")
+      ->required();
+  add_choice(command, "--scan-units", &align.scan_units, scene::k_length_units,
+             "Unit of the PLY file: m, cm, mm, in or ft");
+  command
+      ->add_option("--cad", align.mesh,
+                   "CAD mesh: .glb, .obj, .stl, .ply, .3mf, .fbx … (docs/formats.md); without it the scene's "
+                   "prototype")
+      ->type_name("MESH");
+  add_choice(command, "--units", &align.units, scene::k_length_units,
+             "Unit of the CAD mesh: m, cm, mm, in or ft");
+  command
+      ->add_option("--tolerance", options->tolerance_mm,
+                   "Deviation that is in order, in mm; the colours change at 1, 2 and 4 times it")
+      ->check(CLI::Range(0.001, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--reach-mm", options->reach_mm,
+                   "Surfaces further from the CAD, in mm, are something else (a hand) and are not measured")
+      ->check(CLI::Range(0.01, 1000.0))
+      ->capture_default_str();
+  command
+      ->add_option("--spacing-mm", options->spacing_mm,
+                   "Distance of the CAD's points in mm (0 or without it: that of the scan's points)")
+      ->check(CLI::Range(0.0, 1000.0));
+  command
+      ->add_option("--start", align.start,
+                   "POSES.json or align.json with world_from_prototype, the initial pose")
+      ->type_name("FILE.json");
+  command
+      ->add_option("--points", align.points,
+                   "PICKS.json: three or more pairs of corresponding points on CAD and scan")
+      ->type_name("FILE.json");
+  command
+      ->add_option(
+          "--scene", align.scene,
+          "Scene whose prototype is the CAD, or carries the markers that give the initial pose (--rig, "
+          "--frame)")
+      ->type_name("SCENE");
+  command->add_option("--rig", align.rig, "Rig folder, needed for --frame")->type_name("RIG");
+  command
+      ->add_option("--frame", align.frames,
+                   "CAMERA=IMAGE, a photograph of the prototype; repeat the option for other cameras")
+      ->type_name("CAMERA=IMAGE");
+  command->add_flag("--no-align", options->no_align,
+                    "Trust the given pose (--start, --points, or markers) and do not align");
+  command
+      ->add_option(
+          "--fit", options->fit_mm,
+          "Local best fit: X,Y,Z,X,Y,Z of two opposite corners of a box in the CAD's frame, in mm; the "
+          "scan inside it is aligned")
+      ->type_name("NUMBERS")
+      ->delimiter(',')
+      ->expected(6);
+  command->add_option("--out", align.out, "Folder to write")->type_name("FOLDER")->required();
+  command->add_flag("--json", options->json, "Print deviation.json instead of lines");
+  command->callback([options, &run] { run = [options] { return report_result(run_deviation(*options)); }; });
 }
 
 }  // namespace limn::apps

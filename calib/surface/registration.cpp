@@ -33,7 +33,6 @@ constexpr double k_held = 1e-6;       // share of the largest eigenvalue; below 
 // RMS residual per step; below it, a form error of a tenth of a millimetre moves the fit by 3 mm.
 constexpr double k_sensitive = 0.03;
 constexpr double k_loose_m = 0.5e-3;  // standard deviation that deserves a warning
-constexpr double k_free_m = 1;        // standard deviation along free directions
 // Distance that counts as near, as a share of the mesh's diagonal and in metres, and the least shares of scan
 // and mesh that are near where both are of one object.
 constexpr double k_near = 0.01, k_least_near_m = 3e-3;
@@ -242,7 +241,7 @@ std::optional<Fitted> fitted(const scene::MeshBvh& index,
 
 // Cluster-robust (sandwich) covariance in the gauge, without free directions: from the scatter of the
 // residuals' sums and the derivatives of these sums by a step (Huber 1967).
-Matrix6d covariance_of(const Fitted& fit, double cluster) {
+Matrix6d covariance_of(const Fitted& fit, double cluster, double free_stddev_m) {
   Matrix6d slopes = Matrix6d::Zero();
   for (const Row& row : fit.rows) slopes += row.slope * row.jacobian * row.jacobian.transpose();
   const EigenPairs6 eigen = eigen_pairs(slopes);
@@ -259,7 +258,7 @@ Matrix6d covariance_of(const Fitted& fit, double cluster) {
   for (int i = 0; i < 6; ++i) {
     const Vector6d d = eigen.vectors.col(i);
     if (eigen.values[i] < k_held * eigen.values[5])
-      free += k_free_m * k_free_m * d * d.transpose();
+      free += free_stddev_m * free_stddev_m * d * d.transpose();
     else
       inverse += d * d.transpose() / eigen.values[i];
   }
@@ -316,10 +315,10 @@ std::vector<std::string> free_directions(const Fitted& fit, const Matrix6d& cova
   return names;
 }
 
-Registration alignment_of(const Fitted& fit, double mesh_diagonal) {
+Registration alignment_of(const Fitted& fit, double mesh_diagonal, double free_stddev_m) {
   Registration result;
   result.world_from_prototype = fit.pose;
-  const Matrix6d covariance = covariance_of(fit, k_cluster * mesh_diagonal);
+  const Matrix6d covariance = covariance_of(fit, k_cluster * mesh_diagonal, free_stddev_m);
   const Matrix6d out = delta_from_gauge(fit.gauge, fit.pose);
   result.covariance = out * covariance * out.transpose();
   result.free_directions = free_directions(fit, covariance);
@@ -387,9 +386,13 @@ struct Patch {
   Vector3d p, n;
   double area = 0;
 };
+// Of very many triangles some are taken, evenly: they are only used for coarse poses.
 std::vector<Patch> patches_of(const scene::Mesh& mesh) {
+  constexpr std::size_t k_most = 50'000;
+  const std::size_t step = mesh.triangles.size() / k_most + 1;
   std::vector<Patch> patches;
-  for (const auto& [i, j, k] : mesh.triangles) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += step) {
+    const auto& [i, j, k] = mesh.triangles[t];
     const Vector3d a = mesh.positions[i].cast<double>(), b = mesh.positions[j].cast<double>(),
                    c = mesh.positions[k].cast<double>();
     const Vector3d area = (b - a).cross(c - a) / 2;
@@ -521,7 +524,7 @@ Result<Registration> refined_registration(const scene::Mesh& mesh,
         "expected at least {} scan points within {} of the mesh at the start that face the same way, found "
         "fewer. Check the start and the units; a mesh whose triangles are inside out does not fit.",
         k_least_points, size_text(options.reach * size));
-  return alignment_of(*fit, size);
+  return alignment_of(*fit, size, options.free_stddev_m);
 }
 
 Result<Pose> pose_from_picks(const std::vector<Pick>& picks, double max_apart_m) {
@@ -625,10 +628,11 @@ Result<GlobalRegistration> global_registration(const scene::Mesh& mesh,
         "found no pose in which the mesh lies on the scan. Give a start: --start, --points, or markers; "
         "check --units.");
   GlobalRegistration found;
-  LIMN_TRY(
-      found.registration,
-      refined_registration(mesh, index, scan, fits[0].fit.pose,
-                           {.reach = 0.03, .cell = options.cell, .max_iterations = options.max_iterations}));
+  LIMN_TRY(found.registration, refined_registration(mesh, index, scan, fits[0].fit.pose,
+                                                    {.reach = 0.03,
+                                                     .cell = options.cell,
+                                                     .max_iterations = options.max_iterations,
+                                                     .free_stddev_m = options.free_stddev_m}));
   for (std::size_t i = 1; i < fits.size() && !found.rival; ++i) {
     if (same_pose(fits[i].fit.pose, fits[0].fit.pose, patches[0].p, size)) continue;
     found.rival = fits[i].fit.pose;

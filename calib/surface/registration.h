@@ -21,14 +21,17 @@ struct RegistrationOptions {
   /// Points used for the fit: one in each cell of this size, as a share of the mesh's diagonal.
   double cell = 1 / 120.0;
   int max_iterations = 80;
+  /// Standard deviation that is stated along directions that the shape does not determine, m (at the mesh's
+  /// radius for rotations): how far the start may be off in them.
+  double free_stddev_m = 1;
 };
 
 /// The pose of a mesh in the scan's world, and its uncertainty.
 struct Registration {
   Pose world_from_prototype;
   /// Covariance of boxplus's perturbation. It follows from the residuals' own scatter, summed over cells of
-  /// 1/20 of the mesh, so that errors shared by neighbouring points count as shared; standard deviation 1 m
-  /// (or as much at the mesh's radius) along free directions.
+  /// 1/20 of the mesh, so that errors shared by neighbouring points count as shared; along free directions
+  /// RegistrationOptions::free_stddev_m.
   Matrix6d covariance = Matrix6d::Zero();
   double rms_m = 0;  ///< RMS distance of the points in the fit, along the mesh's normals
   int used = 0;      ///< number of points in the fit

@@ -38,15 +38,31 @@ constexpr std::size_t k_most_printed = 12;  // number of differences printed; al
 // A pose and how it was found.
 struct Start {
   Pose world_from_prototype;
-  std::optional<Matrix6d> covariance;  // only if it comes from markers
+  std::optional<Matrix6d> covariance;  // if it comes from markers or from a file that states it
   std::string how;
 };
 
+// Six rows of six numbers.
+Matrix6d matrix_of(const ConfigNode& node) {
+  Matrix6d matrix = Matrix6d::Zero();
+  const std::vector<ConfigNode> rows = node.items();
+  if (rows.size() != 6) {
+    node.problem(fmt::format("expected 6 rows of 6 numbers, found {} rows.", rows.size()));
+    return matrix;
+  }
+  for (int r = 0; r < 6; ++r) {
+    const std::vector<double> row = rows[static_cast<std::size_t>(r)].numbers(6);
+    for (std::size_t c = 0; c < row.size(); ++c) matrix(r, static_cast<int>(c)) = row[c];
+  }
+  return matrix;
+}
+
 Result<Start> start_from_file(const fs::path& path) {
   LIMN_TRY(const Config config, Config::load(path, ""));
-  const Pose pose = config.root().at("world_from_prototype").pose();
+  Start start{config.root().at("world_from_prototype").pose(), std::nullopt, "start"};
+  if (const auto rows = config.root().find("covariance")) start.covariance = matrix_of(*rows);
   LIMN_TRY_STATUS(config.status());
-  return Start{pose, std::nullopt, "start"};
+  return start;
 }
 
 Result<Start> start_from_picks(const fs::path& path, double metres_per_unit) {
@@ -150,6 +166,8 @@ Status check_options(const AlignOptions& command) {
   if (command.scan.empty() && command.scene.empty())
     return usage_error(
         "expected --scan SCAN.ply, or --scene, --rig and --frame to get the pose from markers alone.");
+  if (!command.is_aligned && starts == 0)
+    return usage_error("--no-align: expected the pose with it (--start, --points, or --scene with --frame).");
   return {};
 }
 
@@ -174,13 +192,18 @@ Result<MeshAligned> align(const AlignOptions& command,
                           const scene::ScanSurface& scan,
                           const std::optional<Start>& start) {
   MeshAligned result;
-  if (start) {
+  const calib::RegistrationOptions options{.free_stddev_m = command.free_stddev_m};
+  if (start && !command.is_aligned) {
+    result.registration.world_from_prototype = start->world_from_prototype;
+    if (start->covariance) result.registration.covariance = *start->covariance;
+    result.how = "given";
+  } else if (start) {
     LIMN_TRY(result.registration,
-             calib::refined_registration(mesh, index, scan, start->world_from_prototype));
+             calib::refined_registration(mesh, index, scan, start->world_from_prototype, options));
     result.how = start->how;
   } else {
     log_info("align: no start given; the whole scan is searched");
-    const auto found = calib::global_registration(mesh, index, scan);
+    const auto found = calib::global_registration(mesh, index, scan, options);
     if (!found) return error("{}: {}", command.scan.string(), found.message());
     result.registration = found->registration;
     result.how = "search";
@@ -311,25 +334,49 @@ Result<scene::Mesh> mesh_of(const AlignOptions& command) {
 
 }  // namespace
 
+Result<ScanOnMesh> aligned_scan(const AlignOptions& command) {
+  LIMN_TRY_STATUS(check_options(command));
+  if (command.scan.empty())
+    return usage_error("expected --scan SCAN.ply or a folder of limn scan, found none.");
+  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "read"}));
+  ScanOnMesh found;
+  LIMN_TRY(scene::Mesh read, mesh_of(command));
+  found.mesh = std::make_unique<const scene::Mesh>(std::move(read));
+  const scene::Mesh& mesh = *found.mesh;
+  LIMN_TRY(const auto start, start_of(command, command.mesh.empty() ? 1 : mesh.metres_per_unit));
+  found.file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
+  LIMN_TRY(found.scan, scene::load_ply(found.file, scene::metres_per_unit(command.scan_units)));
+  if (const Status sizes = calib::comparable_sizes(mesh, found.scan); !sizes)
+    return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
+  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "align"}));
+  found.index = std::make_unique<const scene::MeshBvh>(mesh);
+  LIMN_TRY(found.aligned, align(command, mesh, *found.index, found.scan, start));
+  found.aligned.overlap =
+      calib::overlap(mesh, *found.index, found.scan, found.aligned.registration.world_from_prototype);
+  return found;
+}
+
 Result<MeshAligned> align_scan(const AlignOptions& command) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY_STATUS(check_options(command));
-  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "read"}));
-  LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
-  const double metres = command.mesh.empty() ? 1 : mesh.metres_per_unit;
-  LIMN_TRY(const auto start, start_of(command, metres));
-  if (command.scan.empty()) return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
-  const fs::path file = fs::is_directory(command.scan) ? command.scan / "mesh.ply" : command.scan;
-  LIMN_TRY(const scene::ScanSurface scan, scene::load_ply(file, scene::metres_per_unit(command.scan_units)));
-  if (const Status sizes = calib::comparable_sizes(mesh, scan); !sizes)
-    return error("{}: {}", (command.mesh.empty() ? command.scene : command.mesh).string(), sizes.message());
-  LIMN_TRY_STATUS(reported(command.report_stage, {.name = "align"}));
-  const scene::MeshBvh index(mesh);
-  LIMN_TRY(MeshAligned aligned, align(command, mesh, index, scan, start));
+  if (command.scan.empty()) {
+    LIMN_TRY(const scene::Mesh mesh, mesh_of(command));
+    LIMN_TRY(const auto start, start_of(command, command.mesh.empty() ? 1 : mesh.metres_per_unit));
+    if (!start)
+      return usage_error(
+          "--scene: without --scan the markers of its prototype need --rig RIG and --frame "
+          "CAMERA=PICTURE.");
+    return written_markers_pose(*start, command, 1e-3 * milliseconds_since(begun));
+  }
+  LIMN_TRY(ScanOnMesh found, aligned_scan(command));
+  const scene::Mesh& mesh = *found.mesh;
+  const scene::MeshBvh& index = *found.index;
+  const scene::ScanSurface& scan = found.scan;
+  const fs::path& file = found.file;
+  MeshAligned aligned = std::move(found.aligned);
   LIMN_TRY_STATUS(reported(command.report_stage, {.name = "compare"}));
   if (const auto size = calib::scan_size(mesh, index, scan, aligned.registration)) aligned.size = *size;
   if (calib::contradicts(aligned.size)) aligned.warnings.push_back(text_of(aligned.size));
-  aligned.overlap = calib::overlap(mesh, index, scan, aligned.registration.world_from_prototype);
   const auto residuals = calib::residuals(index, scan, aligned.registration, k_residual_reach_m);
   const auto differences =
       calib::differences(scan, residuals, aligned.registration, {.least_m = 1e-3 * command.least_mm});

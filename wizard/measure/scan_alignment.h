@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,6 +11,8 @@
 #include "core/result.h"
 #include "core/stage.h"
 #include "scene/mesh.h"
+#include "scene/mesh_bvh.h"
+#include "scene/scan_surface.h"
 
 namespace limn::wizard {
 
@@ -26,6 +29,9 @@ struct AlignOptions {
   std::filesystem::path rig;
   std::vector<std::string> frames;  ///< CAMERA=PICTURE, images of the object as it was scanned
   double least_mm = 1;              ///< smaller differences are not reported
+  /// False: the start is the pose; it may state its covariance, as align.json does.
+  bool is_aligned = true;
+  double free_stddev_m = 1;  ///< as RegistrationOptions
   std::filesystem::path out;
   ReportStage report_stage = {};  ///< stages: read, align, compare, write
 };
@@ -38,6 +44,19 @@ struct MeshAligned {
   std::string how;                    ///< where the start came from
   std::vector<std::string> warnings;  ///< symmetry, undetermined directions, differences of CAD and scan
 };
+
+/// A CAD mesh, a scan, and the pose that was found.
+struct ScanOnMesh {
+  std::unique_ptr<const scene::Mesh> mesh;
+  std::unique_ptr<const scene::MeshBvh> index;  ///< the mesh's
+  scene::ScanSurface scan;
+  std::filesystem::path file;  ///< the scan's PLY
+  MeshAligned aligned;         ///< without the scan's size
+};
+
+/// The first part of align_scan(): reads both, aligns them and measures their overlap. It writes nothing and
+/// does not judge the overlap. Needs a scan.
+Result<ScanOnMesh> aligned_scan(const AlignOptions& options);
 
 /// Finds the pose of a CAD mesh in the scan and writes poses.json (which can be given as POSES.json),
 /// align.json with the covariance, residual.ply, residual.png and residual-side.png; warns where the CAD and

@@ -1,0 +1,302 @@
+#include "apps/deviation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <optional>
+
+#include "apps/scan.h"
+#include "calib/surface/surface_samples.h"
+#include "core/config.h"
+#include "core/file.h"
+#include "core/rig.h"
+#include "scene/scan_surface.h"
+#include "sim/truth.h"
+#include "sim/virtual_rig.h"
+#include "tests/support/matchers.h"
+#include "tests/support/meshes.h"
+#include "tests/support/text.h"
+#include "tests/support/worlds.h"
+#include "wizard/capture/capture_plan.h"
+#include "wizard/capture/virtual_capture.h"
+
+namespace limn::apps {
+namespace {
+
+namespace fs = std::filesystem;
+using calib::DeviationState;
+using Eigen::Vector3d;
+
+const fs::path k_plan = test::config_folder() / "plans/bench.json",
+               k_door = test::config_folder() / "scenes/door/door.glb";
+
+// Clay that was added to the door's outer side or taken from it (m, the door's frame).
+struct DoorBump {
+  double x = 0, y = 0, radius = 0, height = 0;
+};
+constexpr DoorBump k_door_bumps[] = {{-0.20, -0.09, 0.030, 0.3e-3},  {-0.11, 0.03, 0.030, 1e-3},
+                                     {0.12, -0.09, 0.035, 3e-3},     {0.20, -0.05, 0.025, -0.6e-3},
+                                     {-0.05, -0.12, 0.030, -1.5e-3}, {0.05, 0.00, 0.035, -3e-3}};
+
+double door_height(const Vector3d& p) {
+  double sum = 0;
+  for (const DoorBump& b : k_door_bumps) {
+    const double share = 1 - (Eigen::Vector2d(b.x, b.y) - p.head<2>()).squaredNorm() / (b.radius * b.radius);
+    if (share > 0) sum += b.height * share * share;
+  }
+  return sum;
+}
+
+// The door with its bumps, finely divided, so that it has their shape.
+scene::Mesh bumped(const scene::Mesh& door) {
+  scene::Mesh mesh = door;
+  const scene::ScanSurface fine = calib::surface_samples(door, 2.5e-3, 2'000'000).surface;
+  mesh.positions = fine.positions;
+  mesh.triangles = fine.triangles;
+  mesh.uvs.clear();
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  for (std::size_t i = 0; i < fine.positions.size(); ++i)
+    if (fine.normals[i].z() > 0.3f)
+      mesh.positions[i] +=
+          static_cast<float>(door_height(fine.positions[i].cast<double>())) * fine.normals[i];
+  scene::ScanSurface surface;
+  surface.positions = mesh.positions;
+  surface.triangles = mesh.triangles;
+  mesh.normals = scene::normals_from_triangles(surface);
+  return mesh;
+}
+
+// A hand: a palm 50 mm in front of the door and a finger that touches it, as boxes of a mesh (world frame).
+sim::Object box_object(const std::string& name, const Pose& world_from_box, const Vector3d& half) {
+  scene::Mesh mesh;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double side : {-1.0, 1.0}) {
+      const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+      const Vector3d n = side * Vector3d::Unit(axis), u = Vector3d::Unit((axis + 1) % 3), v = n.cross(u);
+      for (const auto& [a, b] : {std::pair{-1, -1}, std::pair{1, -1}, std::pair{1, 1}, std::pair{-1, 1}}) {
+        mesh.positions.push_back((n + a * u + b * v).cwiseProduct(half).cast<float>());
+        mesh.normals.push_back(n.cast<float>());
+      }
+      mesh.triangles.push_back({first, first + 1, first + 2});
+      mesh.triangles.push_back({first, first + 2, first + 3});
+    }
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  sim::Object object;
+  object.name = name;
+  object.mesh = std::make_shared<const scene::Mesh>(std::move(mesh));
+  object.world_from_object = world_from_box;
+  object.albedo = {0.35, 0.45, 0.6};
+  return object;
+}
+
+// The virtual rig scans the door with bumps, dents and a hand on it, once.
+class DoorDeviation : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    out_ = test::test_folder();
+    world_ = test::bench_world();
+    cad_ = world_->scene->prototype->mesh;
+    ASSERT_TRUE(save_rig(world_->rig, out_ / "rig").ok());
+    sim::World world = test::bench_world();
+    std::erase_if(world.objects,
+                  [](const sim::Object& object) { return object.name.starts_with("marker-"); });
+    std::erase_if(world.markers, [](const sim::PlacedMarker&) { return true; });
+    world.find("prototype")->mesh = std::make_shared<const scene::Mesh>(bumped(cad_));
+    const Pose& door = world.world_from_prototype;
+    world.objects.push_back(
+        box_object("palm", door * Pose(Eigen::Quaterniond::Identity(), k_palm), {0.04, 0.03, 0.01}));
+    world.objects.push_back(
+        box_object("finger", door * Pose(Eigen::Quaterniond::Identity(), k_finger), {0.008, 0.045, 0.03}));
+    world_->objects = world.objects;
+    const auto plan = wizard::load_plan(k_plan);
+    ASSERT_TRUE(plan.ok()) << plan.message();
+    {
+      sim::VirtualRig rig(std::move(world));
+      ASSERT_TRUE(
+          wizard::capture_prototype(*plan, {rig.world().world_from_prototype}, &rig, out_ / "captures").ok());
+    }
+    ScanCommand scan;
+    scan.captures = out_ / "captures";
+    scan.rig = out_ / "rig";
+    scan.far_m = 1.75;  // in front of the wall
+    scan.out = out_ / "scan";
+    const Status done = run_scan(scan);
+    ASSERT_TRUE(done.ok()) << done.message();
+  }
+  static void TearDownTestSuite() { world_.reset(); }
+
+  // From a pose as a tracker may state it, a millimetre and a tenth of a degree off.
+  static DeviationCommand command(const fs::path& out) {
+    const Pose truth = world_->world_from_prototype;
+    const Pose start(exp_rotation({0.002, -0.002, 0.002}) * truth.rotation,
+                     truth.translation + Vector3d(1e-3, -1e-3, 1e-3));
+    DeviationCommand command;
+    command.files.align.scan = out_ / "scan";
+    command.files.align.mesh = k_door;
+    command.files.align.start =
+        test::write_json(out / "start.json", {{"world_from_prototype", to_json(start)}});
+    command.files.align.out = out / "deviation";
+    return command;
+  }
+
+  static inline const Vector3d k_palm = {0.0, 0.09, 0.14}, k_finger = {-0.15, -0.05, 0.09};
+  static inline fs::path out_;
+  static inline std::optional<sim::World> world_;
+  static inline scene::Mesh cad_;
+};
+
+TEST_F(DoorDeviation, IsTheClayThatWasAddedOrTakenAway) {
+  const DeviationCommand with = command(test::test_folder());
+  wizard::DeviationFilesOptions options = with.files;
+  const auto report = wizard::write_deviation(options);
+  ASSERT_TRUE(report.ok()) << report.message();
+  const calib::Deviation& found = report->deviation;
+  const sim::Truth truth(*world_);
+  const Pose& world_from_door = world_->world_from_prototype;
+  int count = 0, large = 0, right = 0, invented = 0, hidden = 0;
+  double squares = 0, pulls = 0, sum = 0;
+  for (std::size_t i = 0; i < found.states.size(); ++i) {
+    if (found.cad.surface.normals[i].z() < 0.3f) continue;
+    const Vector3d p = found.cad.surface.positions[i].cast<double>(),
+                   n = found.cad.surface.normals[i].cast<double>();
+    const double height = door_height(p);
+    // 0.05 mm before the clay, so that its own triangles do not hide it.
+    const Vector3d p_clay = world_from_door * Vector3d(p + (height + 5e-5) * n);
+    const bool is_seen =
+        truth.visible(world_->rig.cameras[0], p_clay) && truth.visible(world_->rig.projectors[0], p_clay);
+    hidden += !is_seen;
+    if (!found.has(i)) continue;
+    invented += !is_seen;
+    const double off = static_cast<double>(found.distances_m[i]) - height;
+    ++count;
+    sum += off;
+    squares += off * off;
+    pulls += std::pow(off / static_cast<double>(found.stddevs_m[i]), 2);
+    if (std::abs(height) < 0.3e-3) continue;
+    ++large;
+    right += static_cast<double>(found.distances_m[i]) * height > 0;
+  }
+  const double rms_mm = 1e3 * std::sqrt(squares / count), pull = std::sqrt(pulls / count);
+  printf(
+      "[ deviation ] %.3f mm RMS (mean %.3f), pulls %.2f (noise factor %.2f), right sign %.2f %% of %d, %d "
+      "of %d hidden points invented; %zu points\n",
+      rms_mm, 1e3 * sum / count, pull, found.noise_factor, 100.0 * right / large, large, invented, hidden,
+      found.states.size());
+  EXPECT_GT(count, 20000);
+  EXPECT_GT(large, 1000);
+  EXPECT_LT(rms_mm, 0.15);
+  EXPECT_NEAR(pull, 1, 0.2);
+  EXPECT_GT(right, 0.99 * large);
+  EXPECT_GT(hidden, 2000);
+  EXPECT_LT(invented, 0.01 * hidden);
+}
+
+TEST_F(DoorDeviation, HasAPageAndTables) {
+  DeviationCommand with = command(test::test_folder());
+  with.tolerance_mm = 0.4;
+  const Status done = run_deviation(with);
+  ASSERT_TRUE(done.ok()) << done.message();
+  const fs::path& out = with.files.align.out;
+  const auto json = test::read_json(out / "deviation.json");
+  EXPECT_EQ(json["schema"], "limn.deviation/1");
+  EXPECT_EQ(json["tolerance_mm"], 0.4);
+  EXPECT_TRUE(json["alignment"]["free_directions"].empty());
+  EXPECT_NEAR(json["highest_mm"].get<double>(), 3, 0.4);
+  EXPECT_NEAR(json["lowest_mm"].get<double>(), -3, 0.4);
+  ASSERT_GE(json["extremes"].size(), 5U);
+  const Pose pose = test::pose_of(json["alignment"]["world_from_prototype"]);
+  using namespace test::literals;
+  EXPECT_TRUE(test::pose_near(pose, world_->world_from_prototype, 0.03_deg, 0.15_mm));
+  const std::string page = read_file(out / "deviation.html").value();
+  for (const char* part : {"<img", "not measured", "0.4 to 0.8 mm", "<svg", "-3."})
+    test::expect_contains(page, part);
+  EXPECT_EQ(page.find("http"), std::string::npos) << "the page is one file";
+  const auto ply = scene::load_ply(out / "deviation.ply");
+  ASSERT_TRUE(ply.ok()) << ply.message();
+  const std::string csv = read_file(out / "deviation.csv").value();
+  EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), ply->positions.size() + 1);
+  for (const char* part : {",measured\n", ",uncertain\n", ",not_measured\n"})
+    test::expect_contains(csv, part);
+}
+
+// The handle's region alone; then the pose that was found, which is trusted with its covariance.
+TEST_F(DoorDeviation, IsFittedLocallyOrNotAtAll) {
+  const fs::path own = test::test_folder();
+  DeviationCommand with = command(own);
+  with.fit_mm = {200, 150, 100, 20, -150, -50};
+  const Status done = run_deviation(with);
+  ASSERT_TRUE(done.ok()) << done.message();
+  const auto fitted = test::read_json(with.files.align.out / "deviation.json");
+  EXPECT_NEAR(fitted["alignment"]["fit_box_m"][0][0].get<double>(), 0.02, 1e-9);
+
+  with.files.align.start = test::write_json(own / "given.json", fitted["alignment"]);
+  with.files.align.out = own / "given";
+  with.fit_mm.clear();
+  with.no_align = true;
+  const Status trusted = run_deviation(with);
+  ASSERT_TRUE(trusted.ok()) << trusted.message();
+  const auto given = test::read_json(own / "given/deviation.json");
+  EXPECT_EQ(given["alignment"]["start"], "given");
+  EXPECT_EQ(given["alignment"]["covariance"], fitted["alignment"]["covariance"]);
+  EXPECT_NEAR(given["rms_mm"].get<double>(), fitted["rms_mm"].get<double>(), 1e-3);
+  with.fit_mm = {500, 500, 500, 600, 600, 600};
+  with.no_align = false;
+  with.files.align.out = own / "none";
+  const Status empty = run_deviation(with);
+  ASSERT_FALSE(empty.ok());
+  test::expect_contains(empty.message(), "--fit");
+  EXPECT_FALSE(fs::exists(own / "none"));
+}
+
+TEST_F(DoorDeviation, RefusesOtherUnitsAnotherObjectAndNoCad) {
+  const fs::path own = test::test_folder();
+  DeviationCommand with = command(own);
+  with.files.align.units = scene::LengthUnit::millimetre;
+  test::expect_contains(run_deviation(with).message(), "check --units");
+
+  const scene::Mesh vase = test::grid(60, 60, [](double u, double v) {
+    const double radius = 0.15 + 0.06 * std::sin(9 * v), angle = -2 * M_PI * u;
+    return Vector3d(radius * std::cos(angle), radius * std::sin(angle), 0.6 * v);
+  });
+  scene::ScanSurface other;
+  other.positions = vase.positions;
+  other.triangles = vase.triangles;
+  ASSERT_TRUE(scene::save_ply(other, own / "vase.ply").ok());
+  with = command(own);
+  with.files.align.mesh = own / "vase.ply";
+  with.files.align.units = scene::LengthUnit::metre;
+  const Status another = run_deviation(with);
+  ASSERT_FALSE(another.ok());
+
+  with = command(own);
+  nlohmann::json scene_file = test::read_json(world_->scene->folder / "scene.json");
+  scene_file.erase("prototype");
+  fs::copy(world_->scene->folder, own / "bare", fs::copy_options::recursive);
+  test::write_json(own / "bare/scene.json", scene_file);
+  with.files.align.mesh.clear();
+  with.files.align.scene = own / "bare";
+  test::expect_contains(run_deviation(with).message(), "expected a prototype");
+  EXPECT_FALSE(fs::exists(with.files.align.out));
+}
+
+TEST(DeviationOptions, AreCheckedFirst) {
+  DeviationCommand command;
+  command.files.align.mesh = k_door;
+  command.files.align.scan = "scan";
+  command.files.align.out = test::test_folder() / "out";
+  command.no_align = true;
+  EXPECT_TRUE(run_deviation(command).error().wrong_usage);  // without a pose
+  command.no_align = false;
+  command.reach_mm = 0.3;
+  EXPECT_TRUE(run_deviation(command).error().wrong_usage);  // below the tolerance
+  command.reach_mm = 5;
+  command.fit_mm = {1, 2, 3};
+  EXPECT_TRUE(run_deviation(command).error().wrong_usage);
+  EXPECT_FALSE(fs::exists(command.files.align.out));
+}
+
+}  // namespace
+}  // namespace limn::apps
