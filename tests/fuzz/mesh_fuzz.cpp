@@ -61,12 +61,14 @@ void check_material(const scene::Material& material) {
 void check_mesh(const scene::Mesh& mesh) {
   const std::size_t count = mesh.positions.size();
   LIMN_CHECK(mesh.metres_per_unit > 0 && mesh.normals.size() == count);
-  LIMN_CHECK(mesh.uvs.empty() || mesh.uvs.size() == count);
+  for (const auto* uvs : {&mesh.uvs, &mesh.second_uvs}) {
+    LIMN_CHECK(uvs->empty() || uvs->size() == count);
+    for (const auto& uv : *uvs) LIMN_CHECK(uv.allFinite());
+  }
   LIMN_CHECK(mesh.colours.empty() || mesh.colours.size() == count);
   LIMN_CHECK(mesh.tangents.empty() || mesh.tangents.size() == count);
   for (const auto& position : mesh.positions) LIMN_CHECK(position.allFinite());
   for (const auto& normal : mesh.normals) LIMN_CHECK(std::abs(normal.norm() - 1) < 1e-3F);
-  for (const auto& uv : mesh.uvs) LIMN_CHECK(uv.allFinite());
   for (const auto& colour : mesh.colours) LIMN_CHECK(colour.allFinite() && colour.minCoeff() >= 0);
   for (const auto& tangent : mesh.tangents) LIMN_CHECK(tangent.allFinite());
   LIMN_CHECK(!mesh.triangles.empty() && mesh.triangle_materials.size() == mesh.triangles.size());
@@ -92,8 +94,10 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {
   test::check_read(content, path);
   if (!content) return 0;
   const auto units = scene::states_unit(path) ? std::nullopt : std::optional(scene::LengthUnit::millimetre);
-  const auto mesh = scene::mesh_from_content(*content, path, units);
-  test::check_read(mesh, path);
-  if (mesh) check_mesh(*mesh);
+  const auto meshes = scene::meshes_from_content(*content, path, units);
+  test::check_read(meshes, path);
+  if (!meshes) return 0;
+  check_mesh(meshes->mesh);
+  for (const auto& variant : meshes->variants) check_mesh(variant.mesh);
   return 0;
 }
