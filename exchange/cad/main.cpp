@@ -248,7 +248,7 @@ int run_limited(const Options& options) {
 }  // namespace
 }  // namespace limn::cad
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   const auto options = limn::cad::read_options({argv + 1, argv + argc});
   if (!options) {
     std::cerr << "limn-cad: " << options.message() << '\n';
@@ -259,4 +259,6 @@ int main(int argc, char** argv) {
     return 0;
   }
   return limn::cad::run_limited(*options);
+} catch (const std::exception&) {  // no memory for the command line or for a message
+  return limn::cad::k_no_memory;
 }

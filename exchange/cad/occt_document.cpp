@@ -9,6 +9,7 @@
 #include <opencascade/APIHeaderSection_MakeHeader.hxx>
 #include <opencascade/IGESCAFControl_Reader.hxx>
 #include <opencascade/IGESData_GlobalSection.hxx>
+#include <opencascade/IGESData_IGESEntity.hxx>
 #include <opencascade/IGESData_IGESModel.hxx>
 #include <opencascade/Interface_Static.hxx>
 #include <opencascade/STEPCAFControl_Reader.hxx>
@@ -248,6 +249,15 @@ bool has_iges_end(const std::string& content) {
   return end - begin >= k_section && content[begin + k_section] == 'T';
 }
 
+// Whether a name is empty, on which OpenCASCADE crashes when it reads names.
+bool has_empty_name(const IGESData_IGESModel& model) {
+  for (Standard_Integer i = 1; i <= model.NbEntities(); ++i) {
+    const auto entity = Handle(IGESData_IGESEntity)::DownCast(model.Value(i));
+    if (!entity.IsNull() && entity->HasName() && entity->NameValue().IsNull()) return true;
+  }
+  return false;
+}
+
 Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
   OcctDocument out{.document = new_document(), .format = "IGES"};
   LIMN_TRY(const std::string content, read_file(path));
@@ -260,6 +270,10 @@ Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
   if (model.IsNull() || model->NbEntities() == 0) return damaged(path, "IGES", "no entities");
   const IGESData_GlobalSection& global = model->GlobalSection();
   read_iges_unit(global, &out);
+  if (has_empty_name(*model)) {
+    reader.SetNameMode(false);
+    out.warnings.emplace_back("one of the names is empty; no names are read");
+  }
   progress->begin_stage("translating", k_read_percent, k_transferred_percent);
   if (!reader.Transfer(out.document, progress->Start())) return damaged(path, "IGES", "no shapes");
   return out;

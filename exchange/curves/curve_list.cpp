@@ -46,13 +46,14 @@ std::string encode_curve_list(const CurveList& list) {
 Result<CurveList> decode_curve_list(const std::string& text, const std::string& where) {
   const json read = json::parse(text, nullptr, false);
   if (!read.is_object() || read.value("schema", json()) != k_schema)
-    return error("{}: expected curves as {}, found another text.", where, k_schema);
+    return error("{}: expected curves as {}, found another text. Write the curves again.", where, k_schema);
   try {
     CurveList list = list_in(read);
     for (const NamedCurve& curve : list.curves) LIMN_TRY_STATUS(check_curve(curve, where));
     return list;
   } catch (const json::exception& problem) {
-    return error("{}: expected curves as {}, found a fault in it ({}).", where, k_schema, problem.what());
+    return error("{}: expected curves as {}, found a fault in it ({}). Write the curves again.", where,
+                 k_schema, problem.what());
   }
 }
 

@@ -219,6 +219,18 @@ TEST_F(Cad, IgesSubfiguresAreInstancesWithTheirNames) {
   }
 }
 
+TEST_F(Cad, AnEmptyIgesNameCostsTheNamesAlone) {
+  IgesText iges;
+  const int name = iges.add(406, 15, "1", 0, true);
+  const int first = iges.line({0, 0, 0}, {1, 0, 0}), second = iges.line({0, 1, 0}, {1, 1, 0});
+  iges.add(118, 1, fmt::format("{},{},0,0,0,1,{}", first, second, name));
+  const json found = report(write("plate.igs", iges.file()));
+  ASSERT_EQ(found["solids"].size(), 1u);
+  EXPECT_EQ(found["solids"][0]["name"], "plate");
+  EXPECT_NE(found["warnings"].dump().find("one of the names is empty"), std::string::npos)
+      << found["warnings"];
+}
+
 TEST_F(Cad, SolidsBecomePartsOrVariants) {
   StepText step;
   const auto bolt = step.part("bolt", {step.box({1, 1, 2})});
