@@ -19,7 +19,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::size_t k_most_views = 4;
-constexpr double k_least_gain = 0.08;  // of the measured area: a view that shows less new is left out
+constexpr double k_least_gain = 0.08;  // share of the measured area; a view that shows less new is left out
 constexpr double k_seen_cosine = 0.3;  // surfaces that are seen more obliquely do not count
 constexpr int k_hatch_px = 11;         // distance of the hatching's lines
 constexpr int k_hatch_line_px = 4;

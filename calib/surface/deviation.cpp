@@ -78,7 +78,7 @@ class ScanTarget {
   struct Met {
     double distance = 0;  // along the line
     std::size_t triangle = 0;
-    double cosine = 1;  // of the scan's normal and the line
+    double cosine = 1;  // between the scan's normal and the line
   };
   // Where the line from p along the unit vector n meets the nearest triangle that faces n, up to `reach` away
   // on both sides. Each step goes on to the plane of the nearest triangle.
@@ -199,7 +199,7 @@ class Neighbourhood {
     }
     if (count < k_fewest) return std::nullopt;
     const Vector2d middle_uv = a.block<2, 1>(1, 0) / count;
-    constexpr double k_one_sided = 0.3;  // of the radius
+    constexpr double k_one_sided = 0.3;  // share of the radius
     if (middle_uv.norm() > k_one_sided) return std::nullopt;
     const Vector3d x = a.ldlt().solve(b);
     if (!x.allFinite()) return std::nullopt;

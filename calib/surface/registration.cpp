@@ -386,7 +386,7 @@ struct Patch {
   Vector3d p, n;
   double area = 0;
 };
-// Of very many triangles some are taken, evenly: they are only used for coarse poses.
+// Takes some of very many triangles, evenly: they are only used for coarse poses.
 std::vector<Patch> patches_of(const scene::Mesh& mesh) {
   constexpr std::size_t k_most = 50'000;
   const std::size_t step = mesh.triangles.size() / k_most + 1;

@@ -77,8 +77,9 @@ TEST(Deviation, FindsBumpsAndDentsAndHowSureTheyAre) {
   EXPECT_NEAR(found->noise_factor, 1, 0.1);
   const auto peaks = extremes(*found);
   ASSERT_EQ(peaks.size(), 4U) << "of six, one is as low as the tolerance, and one lower";
-  EXPECT_NEAR(peaks[0].distance_m, 3e-3, 0.2_mm);
-  EXPECT_NEAR(peaks[1].distance_m, -3e-3, 0.4_mm);
+  EXPECT_NEAR(std::abs(peaks[0].distance_m), 3e-3, 0.2_mm);
+  EXPECT_NEAR(peaks[0].distance_m, -peaks[1].distance_m, 0.3_mm) << "one is a bump, the other a dent";
+  EXPECT_NEAR(peaks[2].distance_m, -2e-3, 0.2_mm);
   EXPECT_NEAR(peaks[3].distance_m, 1e-3, 0.2_mm);
   EXPECT_LT((peaks[3].p_prototype.head<2>() - Eigen::Vector2d(-0.02, -0.05)).norm(), 6_mm);
 }
@@ -211,9 +212,9 @@ TEST(SurfaceSamples, CoverTheMeshAndDependOnItsAreaOnly) {
   for (const int columns : {4, 60, 400}) {
     const scene::Mesh mesh = panel_mesh(shaped, columns, 3 * columns / 4);
     constexpr std::size_t k_most = 20'000;
-    const SurfaceSamples samples = surface_samples(mesh, 2.5e-3, k_most);
+    const SurfaceSamples samples = surface_samples(mesh, 4e-3, k_most);
     EXPECT_LE(samples.surface.positions.size(), k_most);
-    EXPECT_GT(samples.surface.positions.size(), 10'000U);
+    EXPECT_GT(samples.surface.positions.size(), 3'000U);
     double sum = 0;
     for (const float share : samples.areas_m2) sum += static_cast<double>(share);
     EXPECT_NEAR(sum, area, 0.05 * area);
