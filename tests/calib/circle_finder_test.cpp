@@ -33,7 +33,7 @@ TEST(CircleFinder, CentresAreFreeOfThePerspectiveAndTheLens) {
   for (const char* text : {"circles:7x5:40mm", "acircles:4x9:25mm"}) {
     const Board board = Board::parse(text).value();
     double worst = 0, worst_plain = 0;
-    for (int index = 1; index < 6; index += 2) {
+    for (const int index : {1, 5}) {
       const Pose camera_from_board = test::tilted_board(board, index, 0.5);
       const cv::Mat photo = test::photographed_board(board, k_camera, camera_from_board, 0, &rng, 6);
       const auto found = find_board(board, photo);
