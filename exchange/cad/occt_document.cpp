@@ -66,7 +66,8 @@ Error damaged(const fs::path& path, const std::string& format, const std::string
 std::string step_schema(const Handle(StepData_StepModel) & model) {
   const APIHeaderSection_MakeHeader header(model);
   if (!header.HasFs() || header.NbSchemaIdentifiers() < 1) return "";
-  const std::string stated = text_of(header.SchemaIdentifiersValue(1)), name = lower(stated);
+  std::string stated = text_of(header.SchemaIdentifiersValue(1));
+  const std::string name = lower(stated);
   const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
   if (has("ap242") || has("managed_model")) return "AP242";
   if (has("ap214") || has("automotive_design")) return "AP214";
