@@ -131,6 +131,18 @@ for (const degrees of [30, 50]) {
     extensions: { KHR_materials_clearcoat: { ...coat, clearcoatNormalTexture: { index: 0 } } } }, low);
   found[`away_${degrees}`] = await drawn(relief, { pbrMetallicRoughness: matte, normalTexture: { index: 0 } }, low);
 }
+
+// Two pieces with a coloured image and an occlusion map: the first is deleted while the second still uses them.
+made.length = 0;
+const colours = await image([255, 0, 0]);
+const pair = await uploaded([half, colours],
+  { pbrMetallicRoughness: { ...matte, baseColorTexture: { index: 1 } }, occlusionTexture: { index: 0 } });
+found.textures = made.length;
+found.pair = light_of(pair, [0, 0, 1]);
+delete_mesh(gl, pair[0]);
+found.one_left = light_of([pair[1]], [0, 0, 1])[1];
+delete_mesh(gl, pair[1]);
+found.textures_left = made.filter((texture) => gl.isTexture(texture)).length;
 found.gl_error = gl.getError();
 return found;
 """
@@ -142,11 +154,16 @@ SOFT, LAMP = 0.16 + 0.22 / 2, 0.75 * 0.537
 def problems_of(found):
     """What is not as it must be, in words."""
     dark, middle, full = (255 * (share * SOFT + LAMP) for share in (0, 0.5, 1))
-    wanted = {"plain": [full, full], "occluded": [dark, full], "occluded_second": [full, dark], "half_occluded": [middle, full]}
+    wanted = {"plain": [full, full], "occluded": [dark, full], "pair": [dark, full],
+              "occluded_second": [full, dark], "half_occluded": [middle, full]}
     # A relief that looks away is seen at its edge, by whatever angle it looks away.
     wanted |= {f"{kind}_50": found[f"{kind}_30"] for kind in ("coat_away", "away")}
     out = [f"{name}: expected the levels {levels}, found {found[name]}" for name, levels in wanted.items()
            if max(abs(a - b) for a, b in zip(levels, found[name])) > 2]
+    facts = {"textures": 3, "textures_left": 0}  # the colour, the occlusion and a white one
+    out += [f"{name}: expected {number}, found {found[name]}" for name, number in facts.items() if found[name] != number]
+    if abs(found["one_left"] - full) > 2:
+        out.append(f"expected the level {full} of a piece whose neighbour is deleted, found {found['one_left']}")
     if found["gl_error"]:
         out.append(f"expected no error of WebGL, found {found['gl_error']}")
     return out
