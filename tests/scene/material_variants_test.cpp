@@ -124,6 +124,17 @@ TEST(MaterialVariants, DamagedDataIsAnErrorThatSaysWhatIsWrong) {
          "at most 64 variants, found 65");
 }
 
+TEST(MaterialVariants, AMessageDoesNotRepeatAWholeExtension) {
+  json file = shoe();
+  std::string long_name = "x";
+  for (int i = 0; i < 5000; ++i) long_name += "\u00e4";  // two bytes
+  file["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"] = {{"mapping", long_name}};
+  const auto meshes = loaded(file);
+  ASSERT_FALSE(meshes);
+  EXPECT_LT(meshes.message().size(), 400U + test::test_folder().string().size());
+  EXPECT_NE(meshes.message().find("\u00e4..."), std::string::npos) << meshes.message();
+}
+
 std::string g_messages;
 
 Result<Material> material_with(const json& extensions) {
