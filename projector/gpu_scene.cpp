@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/log.h"
+#include "core/photometric_response.h"
 #include "core/result.h"
 #include "projector/bindings.h"
 #include "projector/brdf_lut.h"
@@ -242,6 +243,36 @@ void add_packed(const scene::SurfaceMaps& maps, GpuMaterial* gpu, std::vector<sc
   if (are_apart) gpu->more_maps.z() = add_map(open, k_second_occlusion, gpu, layers);
 }
 
+// Makes a texture in the second coordinates plain: with its colour at (0, 0), where four of its texels meet.
+void make_plain(scene::Texture* map, bool is_srgb) {
+  if (map->image.empty() || !map->in_second_uvs) return;
+  const cv::Mat& image = map->image;
+  cv::Mat plain(1, 1, CV_8UC3);
+  for (int c = 0; c < 3; ++c) {
+    double sum = 0;
+    for (const int row : {0, image.rows - 1})
+      for (const int column : {0, image.cols - 1}) {
+        const double value = image.at<cv::Vec3b>(row, column)[c] / 255.0;
+        sum += is_srgb ? linear_from_srgb(value) : value;
+      }
+    const double mean = is_srgb ? srgb_from_linear(sum / 4) : sum / 4;
+    plain.at<cv::Vec3b>(0, 0)[c] = cv::saturate_cast<std::uint8_t>(255 * mean);
+  }
+  map->image = plain;
+  map->in_second_uvs = false;
+}
+
+// A material as a mesh without second texture coordinates shows it.
+scene::Material without_second_uvs(scene::Material material) {
+  scene::SurfaceMaps& maps = material.maps;
+  scene::Clearcoat& coat = material.coat;
+  for (scene::Texture* map : {&maps.metallic_roughness, &maps.normals, &maps.occlusion, &coat.factor_map,
+                              &coat.roughness_map, &coat.normals})
+    make_plain(map, false);
+  make_plain(&maps.emission, true);
+  return material;
+}
+
 }  // namespace
 
 struct GpuScene::Staging {
@@ -348,7 +379,6 @@ void GpuScene::add_material(const scene::Material& material, const scene::Mesh& 
     gpu.coat.w() = add_map(coat.normals, k_second_coat_normals, &gpu, &staging->maps);
     has_surface_maps_ |= coat.has_maps();
   }
-  if (mesh.second_uvs.empty()) gpu.second.y() = 0;
   staging->materials.push_back(gpu);
 }
 
@@ -393,7 +423,8 @@ void GpuScene::add_colours(const scene::Mesh& mesh, std::size_t first_material, 
 
 TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) {
   const auto first_material = static_cast<std::uint32_t>(staging->materials.size());
-  for (const scene::Material& material : mesh.materials) add_material(material, mesh, staging);
+  for (const scene::Material& material : mesh.materials)
+    add_material(mesh.second_uvs.empty() ? without_second_uvs(material) : material, mesh, staging);
   TriangleRun run;
   run.has_cut_outs = std::any_of(staging->materials.begin() + static_cast<std::ptrdiff_t>(first_material),
                                  staging->materials.end(),

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/file.h"
+#include "core/json_text.h"
 #include "scene/named_file.h"
 
 namespace limn::scene {
@@ -314,6 +315,15 @@ Result<std::vector<std::uint32_t>> GltfFile::indices(std::size_t index) {
   out.reserve(all.count);
   for (const double value : all.values) out.push_back(static_cast<std::uint32_t>(std::max(value, 0.0)));
   return out;
+}
+
+std::string short_text(const nlohmann::json& json) {
+  std::string text = json_text(json);
+  std::size_t end = 100;
+  if (text.size() <= end) return text;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U)
+    --end;  // a character stays whole
+  return text.substr(0, end) + "...";
 }
 
 }  // namespace limn::scene

@@ -55,6 +55,9 @@ class GltfFile {
   std::map<std::size_t, std::string> buffers_, decoded_views_;
 };
 
+/// JSON as text for a message. What is longer than about 100 characters is cut.
+std::string short_text(const nlohmann::json& json);
+
 /// A JSON number as a whole number from 0. Throws nlohmann::json::exception for anything else: a negative
 /// number, one with decimals, one beyond 9e15.
 std::size_t whole_number(const nlohmann::json& number);

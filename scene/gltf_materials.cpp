@@ -4,7 +4,6 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "core/json_text.h"
 #include "scene/named_file.h"
 
 namespace limn::scene {
@@ -88,7 +87,7 @@ class Materials {
     for (const auto& [name, value] : object_in(material, "extensions").items())
       if (shown_extensions().count(name) > 0 && !value.is_object())
         return file_.problem(
-            fmt::format("{}: expected an object as {}, found {}", where(material), name, json_text(value)));
+            fmt::format("{}: expected an object as {}, found {}", where(material), name, short_text(value)));
     return {};
   }
 
@@ -130,7 +129,8 @@ class Materials {
 
   Result<TextureUse> texture(const json& parent, const char* key) const {
     if (parent.contains(key) && !parent.at(key).is_object())
-      return file_.problem(fmt::format("expected an object as {}, found {}", key, json_text(parent.at(key))));
+      return file_.problem(
+          fmt::format("expected an object as {}, found {}", key, short_text(parent.at(key))));
     const json& use = object_in(parent, key);
     if (use.empty()) return TextureUse{};
     const json& texture = file_.root().at("textures").at(whole_number(use.at("index")));
@@ -138,7 +138,7 @@ class Materials {
     if (!image)
       return file_.problem(fmt::format("texture {}: expected an image, found none that Limn knows ({})",
                                        whole_number(use, "index", 0),
-                                       json_text(object_in(texture, "extensions"))));
+                                       short_text(object_in(texture, "extensions"))));
     if (*image >= images_.size())
       return file_.problem(fmt::format("expected image {}, found {} images", *image, images_.size()));
     TextureUse out = images_[*image];

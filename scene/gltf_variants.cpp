@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "core/json_text.h"
-
 namespace limn::scene {
 namespace {
 
@@ -20,7 +18,7 @@ Result<const json*> list_in(const GltfFile& file, const json& parent, const char
   const json& extension = extensions->at(k_extension);
   if (!extension.is_object() || !extension.contains(key) || !extension.at(key).is_array())
     return file.problem(
-        fmt::format("expected {} with a list \"{}\", found {}", k_extension, key, json_text(extension)));
+        fmt::format("expected {} with a list \"{}\", found {}", k_extension, key, short_text(extension)));
   return &extension.at(key);
 }
 

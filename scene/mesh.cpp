@@ -53,7 +53,15 @@ double metres_per_unit(LengthUnit units) {
 }
 
 Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
-  LIMN_TRY(MeshContent content, load_content(path, std::stop_token()));
+  return load_mesh(path, units, std::stop_token());
+}
+
+Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units, const std::stop_token& stop) {
+  LIMN_TRY(MeshContent content, load_content(path, stop));
+  if (!content.variants.empty())
+    content.warnings.push_back(fmt::format(
+        "{}: its {} material variants are not used here; it has the materials that the file uses by default.",
+        path.string(), content.variants.size()));
   content.variants.clear();
   for (MeshPiece& piece : content.pieces) piece.variant_materials.clear();
   LIMN_TRY(MeshWithVariants meshes, meshes_from_content(std::move(content), path, units));

@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "core/log.h"
+#include "core/names.h"
+#include "core/utf8.h"
 #include "scene/read_materials.h"
 #include "scene/tangents.h"
 
@@ -32,11 +34,10 @@ static_assert(sizeof(Corner) == 13 * sizeof(float));
 // A mesh as it comes from the file: three corners per triangle, no shared vertices.
 struct Soup {
   std::vector<Corner> corners;
-  std::vector<Eigen::Vector4f> tangents;  // per corner, as in Mesh; empty: the file has none
-  std::vector<std::uint16_t> triangle_materials;
+  std::vector<Eigen::Vector4f> tangents;       // per corner, as in Mesh; empty: the file has none
+  std::vector<std::uint32_t> triangle_pieces;  // per triangle, index into MeshContent::pieces
   bool has_uvs = false, has_second_uvs = false;
   bool has_colours = false;
-  std::set<std::pair<std::size_t, int>> lacking;  // materials and the sets that pieces of theirs do not have
 };
 
 // Whether the texture's axes are parallel to its coordinates' axes, as a file's tangents assume.
@@ -51,15 +52,13 @@ Eigen::Vector2f uv_at(const MeshPiece& piece, const TexturePlace& place, std::ui
   return uvs ? place.moved * (*uvs)[i] : Eigen::Vector2f::Zero().eval();
 }
 
-// Adds a piece whose coordinates are `metres` long.
-void append(const MeshPiece& piece, const MaterialSource& material, double metres, Soup* soup) {
+// Adds a piece, with its number, whose coordinates are `metres` long.
+void append(
+    const MeshPiece& piece, std::size_t number, const MaterialSource& material, double metres, Soup* soup) {
   const std::vector<TexturePlace> places = texture_places(material);
   const bool has_second = places.size() > 1;
   soup->has_uvs |= piece.find_uvs(places[0].coordinates) != nullptr;
   soup->has_second_uvs |= has_second && piece.find_uvs(places[1].coordinates) != nullptr;
-  if (!texture_uses(material).empty())
-    for (const TexturePlace& place : places)
-      if (!piece.find_uvs(place.coordinates)) soup->lacking.emplace(piece.material, place.coordinates);
   soup->has_colours |= !piece.colours.empty();
   const bool has_tangents =
       !piece.normals.empty() && !piece.tangents.empty() && is_upright(tangent_place(material));
@@ -76,15 +75,15 @@ void append(const MeshPiece& piece, const MaterialSource& material, double metre
       soup->corners.push_back(corner);
       if (has_tangents) soup->tangents.push_back(piece.tangents[i]);
     }
-    soup->triangle_materials.push_back(static_cast<std::uint16_t>(piece.material));
+    soup->triangle_pieces.push_back(static_cast<std::uint32_t>(number));
   }
   if (!soup->tangents.empty()) soup->tangents.resize(soup->corners.size(), Eigen::Vector4f::Zero());
 }
 
 Soup soup_of(const MeshContent& content, double metres) {
   Soup soup;
-  for (const MeshPiece& piece : content.pieces)
-    append(piece, content.materials[piece.material], metres, &soup);
+  for (std::size_t i = 0; i < content.pieces.size(); ++i)
+    append(content.pieces[i], i, content.materials[content.pieces[i].material], metres, &soup);
   return soup;
 }
 
@@ -124,7 +123,7 @@ void make_normals(Soup* soup) {
   std::vector<unsigned> fill(begin.begin(), begin.end() - 1);
   for (unsigned c = 0; c < position_of.size(); ++c) around[fill[position_of[c]]++] = c;
 
-  std::vector<Eigen::Vector3f> d_face(soup->triangle_materials.size());
+  std::vector<Eigen::Vector3f> d_face(soup->triangle_pieces.size());
   for (std::size_t t = 0; t < d_face.size(); ++t) d_face[t] = face_normal(*soup, t).normalized();
   for (unsigned c = 0; c < position_of.size(); ++c) {
     if (soup->corners[c].normal.squaredNorm() > 0.25f) continue;  // the file gave a normal
@@ -138,9 +137,11 @@ void make_normals(Soup* soup) {
   }
 }
 
-// Merges equal vertices and drops triangles without area. `corner_tangents` gets the remaining corners'
-// tangents.
-Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
+// Merges equal vertices and drops triangles without area. `pieces` gets the pieces of the remaining
+// triangles, and `corner_tangents` the tangents of their corners.
+Mesh joined(const Soup& soup,
+            std::vector<std::uint32_t>* pieces,
+            std::vector<Eigen::Vector4f>* corner_tangents) {
   const std::size_t corner_count = soup.corners.size();
   std::vector<unsigned> remap(corner_count);
   const std::size_t count = meshopt_generateVertexRemap(remap.data(), nullptr, corner_count,
@@ -158,10 +159,10 @@ Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
     if (soup.has_second_uvs) mesh.second_uvs[remap[c]] = soup.corners[c].second_uv;
     if (soup.has_colours) mesh.colours[remap[c]] = soup.corners[c].colour;
   }
-  for (std::size_t t = 0; t < soup.triangle_materials.size(); ++t) {
+  for (std::size_t t = 0; t < soup.triangle_pieces.size(); ++t) {
     if (!(face_normal(soup, t).squaredNorm() > 0)) continue;  // without area
     mesh.triangles.push_back({remap[3 * t], remap[3 * t + 1], remap[3 * t + 2]});
-    mesh.triangle_materials.push_back(soup.triangle_materials[t]);
+    pieces->push_back(soup.triangle_pieces[t]);
     if (soup.tangents.empty()) continue;
     for (std::size_t k = 0; k < 3; ++k) corner_tangents->push_back(soup.tangents[3 * t + k]);
   }
@@ -169,8 +170,8 @@ Mesh joined(const Soup& soup, std::vector<Eigen::Vector4f>* corner_tangents) {
 }
 
 // Removes the texture maps of a mesh without uvs. A material with an emission map then emits nothing, and one
-// with a map of its clearcoat has none.
-void leave_out_maps(const fs::path& path, Mesh* mesh) {
+// with a map of its clearcoat has none. Returns whether there were any.
+bool leave_out_maps(Mesh* mesh) {
   bool has_textures = false;
   for (Material& material : mesh->materials) {
     Clearcoat& coat = material.coat;
@@ -179,26 +180,7 @@ void leave_out_maps(const fs::path& path, Mesh* mesh) {
     material.maps = {};
     coat = {.factor = coat.factor_map.image.empty() ? coat.factor : 0, .roughness = coat.roughness};
   }
-  if (!has_textures) return;
-  log_warning(
-      "{}: expected texture coordinates because its materials have textures, found none. It is shown without "
-      "textures. Export the mesh with texture coordinates.",
-      path.string());
-}
-
-// Warns of pieces without the texture coordinates that a texture of their material lies in.
-void note_lacking(const Soup& soup, const MeshContent& content, const fs::path& path) {
-  if (!soup.has_uvs) return;  // leave_out_maps() warns
-  for (const auto& [material, set] : soup.lacking) {
-    const std::string& name = content.materials[material].name;
-    log_warning(
-        "{}: material {}: expected texture coordinates of set {} on all its triangles, because textures lie "
-        "in "
-        "them, found triangles without. These textures have one colour there. Export the mesh with all sets "
-        "of "
-        "texture coordinates.",
-        path.string(), name.empty() ? std::to_string(material) : "'" + name + "'", set);
-  }
+  return has_textures;
 }
 
 Status check_mesh(const Soup& soup, const fs::path& path) {
@@ -249,29 +231,140 @@ std::vector<Material> used_materials(const MeshContent& content, const std::vect
   return used;
 }
 
-// The mesh of the pieces with their present materials.
-Result<Mesh> mesh_from_content(const MeshContent& content,
-                               const std::vector<Material>& materials,
-                               const fs::path& path,
-                               double metres) {
-  Soup soup = soup_of(content, metres);
-  if (soup.triangle_materials.empty()) return no_triangles(path);
-  LIMN_TRY_STATUS(check_mesh(soup, path));
-  note_lacking(soup, content, path);
-  if (has_missing_normals(&soup)) make_normals(&soup);
+// Which texture coordinates a material's normal maps have: 0 without one, else 1 or 2.
+int normal_set(const Material& material) {
+  const Texture& normals =
+      material.maps.normals.image.empty() ? material.coat.normals : material.maps.normals;
+  return normals.image.empty() ? 0 : normals.in_second_uvs ? 2 : 1;
+}
 
-  std::vector<Eigen::Vector4f> corner_tangents;
-  Mesh mesh = joined(soup, &corner_tangents);
-  if (mesh.triangles.empty()) return no_triangles(path);
-  mesh.metres_per_unit = metres;
-  mesh.materials = used_materials(content, materials);
-  if (mesh.uvs.empty()) leave_out_maps(path, &mesh);
-  const auto has_normal_map = [](const Material& m) {
-    return !m.maps.normals.image.empty() || !m.coat.normals.image.empty();
+// Makes the meshes of a file and of its variants. Where the materials of a variant need the same coordinates
+// and tangents as those of a mesh that is made already, its mesh is a copy of that one with other materials.
+class MeshMaker {
+ public:
+  MeshMaker(MeshContent content, std::vector<Material> materials, fs::path path, double metres)
+      : content_(std::move(content)),
+        materials_(std::move(materials)),
+        path_(std::move(path)),
+        metres_(metres) {}
+
+  Result<MeshWithVariants> make() {
+    MeshWithVariants out;
+    out.variants.reserve(content_.variants.size());  // made_ points to the meshes
+    LIMN_TRY_STATUS(make(&out.mesh));
+    for (std::size_t i = 0; i < content_.variants.size(); ++i) {
+      for (MeshPiece& piece : content_.pieces) piece.material = piece.variant_materials[i];
+      out.variants.push_back({content_.variants[i], {}});
+      LIMN_TRY_STATUS(make(&out.variants.back().mesh));
+    }
+    return out;
+  }
+
+ private:
+  struct Made {
+    const Mesh* mesh;
+    std::vector<std::uint32_t> pieces;   // per triangle
+    std::vector<std::size_t> materials;  // per piece
   };
-  if (std::any_of(mesh.materials.begin(), mesh.materials.end(), has_normal_map))
-    add_tangents(&mesh, corner_tangents);
-  return mesh;
+
+  // The mesh of the pieces with their present materials.
+  Status make(Mesh* mesh) {
+    const auto made = std::find_if(made_.begin(), made_.end(), [&](const Made& one) { return is_like(one); });
+    if (made != made_.end()) {
+      *mesh = *made->mesh;
+      give_materials(made->pieces, mesh);
+      return {};
+    }
+    Soup soup = soup_of(content_, metres_);
+    if (soup.triangle_pieces.empty()) return no_triangles(path_);
+    LIMN_TRY_STATUS(check_mesh(soup, path_));
+    if (has_missing_normals(&soup)) make_normals(&soup);
+    Made now{mesh, {}, {}};
+    for (const MeshPiece& piece : content_.pieces) now.materials.push_back(piece.material);
+    std::vector<Eigen::Vector4f> corner_tangents;
+    *mesh = joined(soup, &now.pieces, &corner_tangents);
+    if (mesh->triangles.empty()) return no_triangles(path_);
+    mesh->metres_per_unit = metres_;
+    give_materials(now.pieces, mesh);
+    if (std::any_of(mesh->materials.begin(), mesh->materials.end(),
+                    [](const Material& material) { return normal_set(material) > 0; }))
+      add_tangents(mesh, corner_tangents);
+    made_.push_back(std::move(now));
+    return {};
+  }
+
+  // Whether the pieces' present materials need the same mesh as those of another one.
+  bool is_like(const Made& made) const {
+    for (std::size_t i = 0; i < made.materials.size(); ++i) {
+      const std::size_t before = made.materials[i], now = content_.pieces[i].material;
+      if (before != now && !need_the_same(before, now)) return false;
+    }
+    return true;
+  }
+
+  bool need_the_same(std::size_t a, std::size_t b) const {
+    if (normal_set(materials_[a]) != normal_set(materials_[b])) return false;
+    if (texture_uses(content_.materials[b]).empty()) return true;  // it reads no coordinates
+    const auto one = texture_places(content_.materials[a]), other = texture_places(content_.materials[b]);
+    return std::equal(one.begin(), one.end(), other.begin(), other.end(), is_same_place);
+  }
+
+  // Gives a mesh the pieces' present materials. `pieces`: per triangle.
+  void give_materials(const std::vector<std::uint32_t>& pieces, Mesh* mesh) {
+    mesh->triangle_materials.resize(pieces.size());
+    for (std::size_t t = 0; t < pieces.size(); ++t)
+      mesh->triangle_materials[t] = static_cast<std::uint16_t>(content_.pieces[pieces[t]].material);
+    mesh->materials = used_materials(content_, materials_);
+    if (!mesh->uvs.empty()) return note_lacking();
+    if (!leave_out_maps(mesh) || std::exchange(is_without_uvs_told_, true)) return;
+    log_warning(
+        "{}: expected texture coordinates because its materials have textures, found none. It is shown "
+        "without textures. Export the mesh with texture coordinates.",
+        path_.string());
+  }
+
+  // Warns of pieces without the texture coordinates that a texture of their material lies in, once for each.
+  void note_lacking() {
+    for (const MeshPiece& piece : content_.pieces) {
+      const MaterialSource& material = content_.materials[piece.material];
+      if (texture_uses(material).empty()) continue;
+      for (const TexturePlace& place : texture_places(material)) {
+        if (piece.find_uvs(place.coordinates)) continue;
+        if (!told_.emplace(piece.material, place.coordinates).second) continue;
+        log_warning(
+            "{}: material {}: expected texture coordinates of set {} on all its triangles, because textures "
+            "lie in them, found triangles without. These textures have one colour there. Export the mesh "
+            "with "
+            "all sets of texture coordinates.",
+            path_.string(),
+            material.name.empty() ? std::to_string(piece.material) : "'" + material.name + "'",
+            place.coordinates);
+      }
+    }
+  }
+
+  MeshContent content_;
+  std::vector<Material> materials_;
+  fs::path path_;
+  double metres_;
+  std::vector<Made> made_;                      // those that are no copies
+  std::set<std::pair<std::size_t, int>> told_;  // materials and the sets that pieces of theirs do not have
+  bool is_without_uvs_told_ = false;
+};
+
+// Refuses a file whose variants together would not fit into memory.
+Status check_count(const MeshContent& content, const fs::path& path) {
+  constexpr std::size_t k_most_triangles = 20'000'000;  // about 2 GB
+  std::size_t count = 0;
+  for (const MeshPiece& piece : content.pieces) count += piece.triangles.size();
+  const std::size_t meshes = content.variants.size() + 1;
+  if (meshes == 1 || count <= k_most_triangles / meshes) return {};
+  std::string names = joined_names(content.variants);
+  if (names.size() > 200) names = as_utf8(names.substr(0, 200)) + "...";
+  return error(
+      "{}: expected at most {} triangles in its meshes together, because each material variant is a mesh, "
+      "found {} in each of {}. Simplify the mesh, or export it with fewer material variants ({}).",
+      path.string(), k_most_triangles, count, meshes, names);
 }
 
 }  // namespace
@@ -281,16 +374,10 @@ Result<MeshWithVariants> meshes_from_content(MeshContent content,
                                              std::optional<LengthUnit> units) {
   for (const std::string& warning : content.warnings) log_warning("{}", warning);
   if (content.pieces.empty()) return no_triangles(path);
+  LIMN_TRY_STATUS(check_count(content, path));
   LIMN_TRY(const double metres, metres_of(content, path, units));
-  LIMN_TRY(const std::vector<Material> materials, read_materials(content, path));
-  MeshWithVariants out;
-  LIMN_TRY(out.mesh, mesh_from_content(content, materials, path, metres));
-  for (std::size_t i = 0; i < content.variants.size(); ++i) {
-    for (MeshPiece& piece : content.pieces) piece.material = piece.variant_materials[i];
-    LIMN_TRY(Mesh mesh, mesh_from_content(content, materials, path, metres));
-    out.variants.push_back({content.variants[i], std::move(mesh)});
-  }
-  return out;
+  LIMN_TRY(std::vector<Material> materials, read_materials(content, path));
+  return MeshMaker(std::move(content), std::move(materials), path, metres).make();
 }
 
 }  // namespace limn::scene

@@ -302,15 +302,18 @@ Status check_size(const Mesh& mesh, std::optional<LengthUnit> given) {
       likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
-Result<MeshWithVariants> load_named_mesh(const MeshFile& file,
-                                         const fs::path& scene_path,
-                                         const std::stop_token& stop) {
-  auto meshes = load_mesh_with_variants(file.path, file.units, stop);
-  if (!meshes) return error("{}: {}: {}", scene_path.string(), file.where, meshes.message());
-  if (const Status size = check_size(meshes->mesh, file.units); !size)
+const Mesh& mesh_of(const Mesh& mesh) { return mesh; }
+const Mesh& mesh_of(const MeshWithVariants& meshes) { return meshes.mesh; }
+
+// What was loaded from a file that the scene names (Mesh or MeshWithVariants), if it has the size of an
+// object.
+template <class Loaded>
+Result<Loaded> checked(Result<Loaded> loaded, const MeshFile& file, const fs::path& scene_path) {
+  if (!loaded) return error("{}: {}: {}", scene_path.string(), file.where, loaded.message());
+  if (const Status size = check_size(mesh_of(*loaded), file.units); !size)
     return error("{}: {} ({}): {}", scene_path.string(), file.where, file.path.filename().string(),
                  size.message());
-  return meshes;
+  return loaded;
 }
 
 // The name of a material variant of a file in its slot. Names are also written into file names, so that
@@ -446,7 +449,7 @@ Status load_variants(std::span<const MeshFile> listed,
   std::vector<Variant> variants;
   for (std::size_t i = 0; i < listed.size(); ++i) {
     const std::string& name = slot->variants[i].name;
-    auto meshes = load_named_mesh(listed[i], path, stop);
+    auto meshes = checked(load_mesh_with_variants(listed[i].path, listed[i].units, stop), listed[i], path);
     if (!meshes) {
       left_out->variants.push_back({slot->name, name, meshes.message(), i == 0});
       continue;
@@ -498,8 +501,8 @@ Status load_files(const Reader& reader,
                   Scene* scene,
                   LeftOut* left_out) {
   if (scene->prototype) {
-    LIMN_TRY(MeshWithVariants meshes, load_named_mesh(*reader.prototype_mesh, path, stop));
-    scene->prototype->mesh = std::move(meshes.mesh);
+    const MeshFile& file = *reader.prototype_mesh;
+    LIMN_TRY(scene->prototype->mesh, checked(load_mesh(file.path, file.units, stop), file, path));
     for (Material& material : scene->prototype->mesh.materials)
       material.cut_below = 0;  // the physical prototype has no transparent parts
     if (reader.albedo_image) {

@@ -17,6 +17,11 @@ Result<MeshWithVariants> load_mesh_with_variants(const std::filesystem::path& pa
                                                  std::optional<LengthUnit> units,
                                                  const std::stop_token& stop);
 
+/// Likewise for load_mesh() of scene/mesh.h.
+Result<Mesh> load_mesh(const std::filesystem::path& path,
+                       std::optional<LengthUnit> units,
+                       const std::stop_token& stop);
+
 /// Likewise for load_scene() of scene/scene.h.
 Result<Scene> load_scene(const std::filesystem::path& path,
                          std::vector<SkippedVariant>* skipped_variants,

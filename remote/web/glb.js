@@ -105,6 +105,7 @@ async function material_of(gltf, bin, material, decoded) {
   const uses = {
     metallic_roughness: surface?.metallicRoughnessTexture,
     normals: material?.normalTexture,
+    occlusion: material?.occlusionTexture,
     emission: material?.emissiveTexture,
     coat: layer.clearcoatTexture,
     coat_roughness: layer.clearcoatRoughnessTexture,
@@ -117,6 +118,7 @@ async function material_of(gltf, bin, material, decoded) {
         picture: await texture_of(gltf, bin, use, decoded),
         set: use.texCoord === 1 ? 1 : 0,
         scale: use.scale ?? 1,
+        strength: use.strength ?? 1,
       };
   return {
     maps,
@@ -130,7 +132,7 @@ async function material_of(gltf, bin, material, decoded) {
 
 /**
  * Returns the meshes [{name, matrix, positions, normals, tangents, uvs, second_uvs, indices, base, texture, cut_below, is_unlit, metallic,
- * roughness, emitted, coat, coat_roughness, maps}] of a file's scene. `maps` are {picture, set, scale} by name; `base` is
+ * roughness, emitted, coat, coat_roughness, maps}] of a file's scene. `maps` are {picture, set, scale, strength} by name; `base` is
  * linear RGBA; where the texture's alpha is below `cut_below` the surface has holes; uvs and texture (a bitmap) may be null. Throws an Error whose message can be shown.
  */
 export async function read_glb(buffer) {

@@ -39,12 +39,46 @@ export function upload_mesh(gl, mesh) {
   if (mesh.tangents) attribute(4, mesh.tangents, 4);
   gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
   gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, mesh.indices, gl.STATIC_DRAW);
-  const map_textures = mesh.maps ? upload_maps(mesh, (picture, is_colour) => texture_of(gl, picture, is_colour)) : [];
-  return { ...mesh, array, count: mesh.indices.length, texture: texture_of(gl, mesh.texture, true), map_textures };
+  const textures = textures_of(gl),
+    take = (picture, is_colour) => textures.take(picture, is_colour);
+  const map_textures = mesh.maps ? upload_maps(mesh, take) : [];
+  return { ...mesh, array, count: mesh.indices.length, texture: take(mesh.texture, true), map_textures };
+}
+
+// The textures of a context's meshes. Those of one image share a texture, and so do all without an image.
+class Textures {
+  #gl;
+  #by_picture = [new Map(), new Map()]; // {texture, users} by image (null: white): of numbers, of colours
+  constructor(gl) {
+    this.#gl = gl;
+  }
+  take(picture, is_colour) {
+    const known = this.#by_picture[picture && is_colour ? 1 : 0],
+      key = picture ?? null;
+    if (!known.has(key)) known.set(key, { texture: make_texture(this.#gl, picture, is_colour), users: 0 });
+    const entry = known.get(key);
+    ++entry.users;
+    return entry.texture;
+  }
+  give_back(texture) {
+    for (const known of this.#by_picture)
+      for (const [key, entry] of known)
+        if (entry.texture === texture && --entry.users === 0) {
+          this.#gl.deleteTexture(texture);
+          known.delete(key);
+        }
+  }
+}
+
+const k_textures = new WeakMap(); // by context
+
+function textures_of(gl) {
+  if (!k_textures.has(gl)) k_textures.set(gl, new Textures(gl));
+  return k_textures.get(gl);
 }
 
 // Makes a texture from an image, or from one white pixel. `is_colour`: it is sRGB.
-function texture_of(gl, picture, is_colour) {
+function make_texture(gl, picture, is_colour) {
   const format = is_colour ? gl.SRGB8_ALPHA8 : gl.RGBA8;
   const texture = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, texture);
@@ -69,5 +103,5 @@ function texture_of(gl, picture, is_colour) {
 /** Frees a mesh of upload_mesh(). */
 export function delete_mesh(gl, { array, texture, map_textures }) {
   gl.deleteVertexArray(array);
-  for (const each of [texture, ...map_textures]) gl.deleteTexture(each);
+  for (const each of [texture, ...map_textures]) textures_of(gl).give_back(each);
 }

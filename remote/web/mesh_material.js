@@ -2,7 +2,7 @@
 // with the viewer: a lamp, and soft light from above and below.
 
 // The textures of a material besides its colour, in the order of their texture units and bits.
-const k_maps = ["metallic_roughness", "normals", "emission", "coat", "coat_roughness", "coat_normals"];
+const k_maps = ["metallic_roughness", "normals", "emission", "coat", "coat_roughness", "coat_normals", "occlusion"];
 const k_first_unit = 8; // the views use the units below
 
 /** Vertex shader: the inputs of upload_mesh(), and what k_material reads. `pass_material(mat3 view_from_model)` writes it. */
@@ -27,6 +27,7 @@ uniform sampler2D u_texture, u_${k_maps.join(", u_")};
 uniform int u_in_second; // a bit for each map that lies in the second texture coordinates
 uniform vec2 u_factors, u_coat_factors; // metalness and roughness; share and roughness of the clear layer
 uniform vec2 u_normal_scales; // of the normals, and of the clear layer's; 0: no map
+uniform float u_occlusion_strength; // how much the occlusion map takes from soft light; 0: no map
 uniform vec3 u_emitted;
 uniform bool u_is_diffuse;
 uniform float u_unlit;
@@ -43,6 +44,12 @@ vec3 mapped_normal(vec3 n, vec3 texel, float scale) {
   vec3 u = normalize(v_tangent.xyz - dot(v_tangent.xyz, n) * n), v = (v_tangent.w < 0.0 ? -1.0 : 1.0) * cross(n, u);
   vec3 along = (2.0 * texel - 1.0) * vec3(scale, scale, 1);
   return normalize(along.x * u + along.y * v + along.z * n);
+}
+
+// The normal on the viewer's side; one that looks away is seen at its edge.
+vec3 turned_to_viewer(vec3 n, vec3 eye) {
+  float nv = dot(n, eye);
+  return nv < 0.0 ? normalize(n - nv * eye) : n;
 }
 
 // Soft light from direction d; a rough surface mixes what is around it.
@@ -68,10 +75,11 @@ float mirrored_lamp(float roughness, vec3 n, vec3 eye) {
 
 float schlick(float cosine) { return pow(1.0 - clamp(cosine, 0.0, 1.0), 5.0); }
 
-vec3 mirrored(vec3 f0, float roughness, vec3 n, vec3 eye) {
+// "open": share of the soft light that arrives.
+vec3 mirrored(vec3 f0, float roughness, vec3 n, vec3 eye, float open) {
   vec2 shares = mirrored_shares(roughness, max(dot(n, eye), 0.0));
   vec3 fresnel = f0 + (1.0 - f0) * schlick(dot(eye, normalize(k_key + eye)));
-  return soft_from(reflect(-eye, n), roughness) * (f0 * shares.x + shares.y) +
+  return open * soft_from(reflect(-eye, n), roughness) * (f0 * shares.x + shares.y) +
          k_key_light * fresnel * mirrored_lamp(roughness, n, eye);
 }
 
@@ -80,18 +88,20 @@ vec4 material_texel() { return texture(u_texture, v_uv); }
 vec3 material_light(vec4 texel, vec3 eye) {
   vec3 base = u_base.rgb * texel.rgb, n_mesh = normalize(v_normal);
   float side = dot(n_mesh, eye) < 0.0 ? -1.0 : 1.0;
-  vec3 n = side * mapped_normal(n_mesh, texture(u_normals, uv_of(1)).rgb, u_normal_scales.x);
+  vec3 n = turned_to_viewer(side * mapped_normal(n_mesh, texture(u_normals, uv_of(1)).rgb, u_normal_scales.x), eye);
+  float open = 1.0 + u_occlusion_strength * (texture(u_occlusion, uv_of(6)).r - 1.0);
   vec3 map = texture(u_metallic_roughness, uv_of(0)).rgb;
   float metallic = u_factors.x * map.b, roughness = u_factors.y * map.g;
   float key = max(dot(n, k_key), 0.0), rim = pow(1.0 - max(dot(n, eye), 0.0), 3.0);
   vec3 f0 = mix(vec3(0.04), base, metallic);
   vec3 diffuse = base * (1.0 - metallic) * (u_is_diffuse ? vec3(1) : 1.0 - f0);
-  vec3 light = diffuse * (0.16 + 0.22 * (0.5 + 0.5 * n.y) + k_key_light * key) + vec3(0.06) * rim;
-  if (!u_is_diffuse) light += mirrored(f0, roughness, n, eye);
+  vec3 light = diffuse * (open * (0.16 + 0.22 * (0.5 + 0.5 * n.y)) + k_key_light * key) + vec3(0.06) * rim;
+  if (!u_is_diffuse) light += mirrored(f0, roughness, n, eye, open);
   light += u_emitted * texture(u_emission, uv_of(2)).rgb;
   vec2 coat = u_coat_factors * vec2(texture(u_coat, uv_of(3)).r, texture(u_coat_roughness, uv_of(4)).g);
-  vec3 n_coat = side * mapped_normal(n_mesh, texture(u_coat_normals, uv_of(5)).rgb, u_normal_scales.y);
-  light = mix(light, mirrored(vec3(1), coat.y, n_coat, eye), coat.x * (0.04 + 0.96 * schlick(dot(n_coat, eye))));
+  vec3 n_coat = turned_to_viewer(side * mapped_normal(n_mesh, texture(u_coat_normals, uv_of(5)).rgb, u_normal_scales.y), eye);
+  float covered = coat.x * (0.04 + 0.96 * schlick(abs(dot(n_coat, eye))));
+  light = mix(light, mirrored(vec3(1), coat.y, n_coat, eye, open), covered);
   return mix(light, base, u_unlit);
 }`;
 
@@ -106,6 +116,7 @@ export function bind_material(gl, at, mesh, base = mesh.base) {
   gl.uniform2f(at("u_factors"), mesh.metallic, mesh.roughness);
   gl.uniform2f(at("u_coat_factors"), mesh.coat, mesh.coat_roughness);
   gl.uniform2f(at("u_normal_scales"), mesh.maps.normals?.scale ?? 0, mesh.maps.coat_normals?.scale ?? 0);
+  gl.uniform1f(at("u_occlusion_strength"), mesh.maps.occlusion?.strength ?? 0);
   gl.uniform3fv(at("u_emitted"), mesh.emitted);
   gl.uniform1i(at("u_is_diffuse"), mesh.metallic === 0 && mesh.roughness === 1 && !mesh.maps.metallic_roughness ? 1 : 0);
   gl.uniform1f(at("u_unlit"), mesh.is_unlit ? 1 : 0);

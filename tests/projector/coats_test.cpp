@@ -126,6 +126,19 @@ TEST_F(CoatsTest, LightAndCompositesOfAClearLayerAreThoseOfTheRayTracer) {
   }
 }
 
+// A mesh without second coordinates shows one colour of what lies in them, and no channel of another texture.
+TEST_F(CoatsTest, ATextureInCoordinatesThatAreMissingIsPlain) {
+  Mesh part = lacquered(-0.08, k_bow);
+  part.second_uvs.clear();
+  const Room room = room_with(scene::Mode::view, std::move(part));
+  Renderer drawing = renderer(room.scene, room.rig);
+  const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
+  const cv::Mat composite =
+      drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
+  const auto seen = agree(composite, judge.parts_image(room.rig.cameras[0]), 0, 15000);
+  EXPECT_TRUE(seen) << seen.message();
+}
+
 // Each map has its own effect: without it, or in the other coordinates, the picture is another.
 TEST_F(CoatsTest, EveryMapOfAClearLayerIsSeenInItsOwnCoordinates) {
   const Mesh whole = lacquered(-0.08, k_bow);

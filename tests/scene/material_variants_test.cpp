@@ -4,6 +4,7 @@
 
 #include "core/file.h"
 #include "scene/glb.h"
+#include "scene/mesh_from_content.h"
 #include "scene/scene.h"
 #include "scene/tangents.h"
 #include "tests/support/matchers.h"
@@ -122,6 +123,93 @@ TEST(MaterialVariants, DamagedDataIsAnErrorThatSaysWhatIsWrong) {
   expect(message([](json* names, json*) { (*names)["variants"][0]["name"] = 3; }), "in the form of glTF 2.0");
   expect(message([](json* names, json*) { (*names)["variants"] = std::vector<json>(65, json::object()); }),
          "at most 64 variants, found 65");
+}
+
+// A triangle with two sets of coordinates; its materials have a texture in set 0, in set 1, none, and in set
+// 2, which the triangle does not have.
+MeshContent content_with(const std::vector<std::size_t>& variant_materials) {
+  MeshContent content;
+  content.metres_per_unit = 1;
+  content.images.push_back({{}, cv::Mat(4, 4, CV_8UC4, cv::Scalar(10, 20, 30, 255))});
+  MeshPiece piece;
+  piece.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  piece.uvs = {{0, 0}, {1, 0}, {0, 1}};
+  piece.more_uvs[1] = {{0.5F, 0}, {0.5F, 1}, {0, 0.25F}};
+  piece.triangles = {{0, 1, 2}};
+  piece.variant_materials = variant_materials;
+  content.pieces.push_back(piece);
+  for (const int set : {0, 1, -1, 2}) {
+    MaterialSource material;
+    if (set >= 0) material.base.embedded = 0;
+    if (set >= 0) material.base.place.coordinates = set;
+    content.materials.push_back(material);
+  }
+  for (const std::size_t material : variant_materials)
+    content.variants.push_back(fmt::format("variant {}", material));
+  return content;
+}
+
+TEST(MaterialVariants, HaveTheCoordinatesOfTheirOwnTextures) {
+  const auto content = content_with({1, 2, 0, 1});
+  const auto meshes = meshes_from_content(content, "shoe.glb", std::nullopt);
+  ASSERT_TRUE(meshes) << meshes.message();
+  const MeshPiece& piece = content.pieces[0];
+  ASSERT_EQ(meshes->variants.size(), 4U);
+  EXPECT_EQ(meshes->mesh.uvs, piece.uvs);
+  EXPECT_EQ(meshes->variants[0].mesh.uvs, piece.more_uvs.at(1));
+  EXPECT_EQ(meshes->variants[2].mesh.uvs, piece.uvs);
+  EXPECT_EQ(meshes->variants[3].mesh.uvs, piece.more_uvs.at(1));
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Mesh& mesh = meshes->variants[i].mesh;
+    EXPECT_EQ(mesh.positions, piece.positions);
+    EXPECT_EQ(mesh.triangle_materials.at(0), piece.variant_materials[i]);
+    EXPECT_EQ(mesh.materials[piece.variant_materials[i]].texture.empty(), i == 1);
+  }
+}
+
+TEST(MaterialVariants, AWarningIsGivenOnce) {
+  testing::internal::CaptureStderr();
+  const auto meshes = meshes_from_content(content_with({3, 0, 3}), "shoe.glb", std::nullopt);
+  const std::string messages = testing::internal::GetCapturedStderr();
+  ASSERT_TRUE(meshes) << meshes.message();
+  const char* words = "expected texture coordinates";
+  const std::size_t first = messages.find(words);
+  ASSERT_NE(first, std::string::npos) << messages;
+  EXPECT_EQ(messages.find(words, first + 1), std::string::npos) << messages;
+}
+
+TEST(MaterialVariants, TooManyTrianglesInAllOfThemAreRefusedByName) {
+  MeshContent content = content_with(std::vector<std::size_t>(64, 0));
+  content.pieces[0].triangles.resize(400'000, {0, 1, 2});
+  const auto meshes = meshes_from_content(content, "shoe.glb", std::nullopt);
+  ASSERT_FALSE(meshes);
+  EXPECT_NE(meshes.message().find("found 400000 in each of 65"), std::string::npos) << meshes.message();
+  EXPECT_NE(meshes.message().find("(variant 0, variant 0"), std::string::npos) << meshes.message();
+}
+
+TEST(MaterialVariants, ThoseOfAPrototypeAreNotUsedAndAMessageSaysSo) {
+  const fs::path folder = test::test_folder();
+  const json scene = {
+      {"schema", "limn.scene/1"}, {"prototype", {{"mesh", "shoe.gltf"}}}, {"slots", json::array()}};
+  ASSERT_TRUE(write_file(folder / "scene.json", scene.dump()));
+  ASSERT_TRUE(write_file(folder / "shoe.gltf", shoe().dump()));
+  testing::internal::CaptureStderr();
+  const auto found = load_scene(folder);
+  const std::string messages = testing::internal::GetCapturedStderr();
+  ASSERT_TRUE(found) << found.message();
+  EXPECT_EQ(colour_of(found->prototype->mesh), Eigen::Vector3f(1, 0, 0));
+  EXPECT_NE(messages.find("its 2 material variants are not used here"), std::string::npos) << messages;
+}
+
+TEST(MaterialVariants, AMessageDoesNotRepeatAWholeExtension) {
+  json file = shoe();
+  std::string long_name = "x";
+  for (int i = 0; i < 5000; ++i) long_name += "\u00e4";  // two bytes
+  file["meshes"][0]["primitives"][0]["extensions"]["KHR_materials_variants"] = {{"mapping", long_name}};
+  const auto meshes = loaded(file);
+  ASSERT_FALSE(meshes);
+  EXPECT_LT(meshes.message().size(), 400U + test::test_folder().string().size());
+  EXPECT_NE(meshes.message().find("\u00e4..."), std::string::npos) << meshes.message();
 }
 
 std::string g_messages;
