@@ -7,7 +7,7 @@
 
 #include "core/result.h"
 #include "exchange/curves/named_curve.h"
-#include "scene/cad_program.h"
+#include "scene/files/cad_program.h"
 
 namespace limn::exchange {
 
@@ -22,7 +22,7 @@ struct CurveReading {
 /// Reads the curves of a STEP or IGES file with limn-cad, in the order of the file. A chain of edges that the
 /// file joins to a wire is one curve. Names are the file's: the curve's own, else its product's, with a
 /// number where several have the same ("line", "line 2"). Units are the file's. Errors: as run_limn_cad() of
-/// scene/cad_program.h; a file without curves.
+/// scene/files/cad_program.h; a file without curves.
 Result<std::vector<NamedCurve>> read_cad_curves(const std::filesystem::path& file,
                                                 const CurveReading& options = {},
                                                 const std::stop_token& stop = {});

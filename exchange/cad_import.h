@@ -5,7 +5,7 @@
 
 #include "core/enum_names.h"
 #include "core/result.h"
-#include "scene/cad_program.h"
+#include "scene/files/cad_program.h"
 
 namespace limn::exchange {
 
@@ -24,7 +24,7 @@ struct CadImportOptions {
 };
 
 /// `limn import cad`: writes a CAD file's solids as GLB, in metres and in the file's frame, and prints what
-/// it holds. Errors: as run_limn_cad() of scene/cad_program.h; a name that does not fit `as`.
+/// it holds. Errors: as run_limn_cad() of scene/files/cad_program.h; a name that does not fit `as`.
 Status import_cad(const CadImportOptions& options);
 
 }  // namespace limn::exchange

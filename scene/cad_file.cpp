@@ -13,7 +13,7 @@
 #include "core/json_text.h"
 #include "core/user_folder.h"
 #include "core/utf8.h"
-#include "scene/fingerprint.h"
+#include "scene/files/fingerprint.h"
 #include "scene/read_gltf.h"
 
 namespace limn::scene {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "scene/cad_program.h"
+#include "scene/files/cad_program.h"
 #include "scene/mesh_content.h"
 
 namespace limn::scene {

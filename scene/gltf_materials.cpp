@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "scene/named_file.h"
+#include "scene/files/named_file.h"
 
 namespace limn::scene {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "scene/gltf_file.h"
+#include "scene/files/gltf_file.h"
 #include "scene/mesh_content.h"
 
 namespace limn::scene {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/gltf_file.h"
+#include "scene/files/gltf_file.h"
 #include "scene/mesh_content.h"
 
 namespace limn::scene {

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "scene/draco_mesh.h"
-#include "scene/gltf_file.h"
+#include "scene/files/draco_mesh.h"
+#include "scene/files/gltf_file.h"
 #include "scene/gltf_materials.h"
 #include "scene/gltf_variants.h"
 #include "scene/read_materials.h"

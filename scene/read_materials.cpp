@@ -13,7 +13,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
-#include "scene/named_file.h"
+#include "scene/files/named_file.h"
 
 namespace limn::scene {
 namespace {

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "core/file.h"
-#include "scene/named_file.h"
+#include "scene/files/named_file.h"
 
 namespace limn::scene {
 namespace {

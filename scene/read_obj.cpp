@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "core/file.h"
-#include "scene/named_file.h"
+#include "scene/files/named_file.h"
 #include "scene/read_mtl.h"
 
 namespace limn::scene {

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "core/file.h"
-#include "scene/named_file.h"
-#include "scene/ply_file.h"
+#include "scene/files/named_file.h"
+#include "scene/files/ply_file.h"
 
 namespace limn::scene {
 namespace {

@@ -11,7 +11,7 @@
 #include <string>
 
 #include "core/file.h"
-#include "scene/ply_file.h"
+#include "scene/files/ply_file.h"
 
 namespace limn::scene {
 namespace {

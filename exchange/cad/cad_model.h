@@ -48,7 +48,7 @@ struct CadNode {
 /// A file that the model was read from.
 struct CadSource {
   std::string name;         ///< Relative to the first file's folder; the first one is the file itself.
-  std::string fingerprint;  ///< fingerprint() of scene/fingerprint.h.
+  std::string fingerprint;  ///< fingerprint() of scene/files/fingerprint.h.
 };
 
 /// What a CAD file holds.

@@ -54,7 +54,7 @@ constexpr const char* k_help =
     "  --progress         Print lines \"progress PERCENT WHAT\" first\n"
     "  --memory-mb N      Take at most so much memory\n";
 
-// Exit codes (scene/cad_program.cpp): 1: a message says what is wrong with the file.
+// Exit codes (scene/files/cad_program.cpp): 1: a message says what is wrong with the file.
 constexpr int k_wrong_file = 1, k_wrong_usage = 2, k_no_memory = 3, k_not_written = 4;
 
 struct Options {

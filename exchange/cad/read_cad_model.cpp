@@ -18,7 +18,7 @@
 #include "exchange/cad/leaves.h"
 #include "exchange/cad/occt_document.h"
 #include "exchange/cad/triangles.h"
-#include "scene/fingerprint.h"
+#include "scene/files/fingerprint.h"
 
 namespace limn::cad {
 namespace {

@@ -204,7 +204,7 @@ class Completion : public testing::Test {
 };
 
 TEST_F(Completion, OfBashGivesCommandsOptionsAndValues) {
-  EXPECT_EQ(bash("de"), "demo detect ");
+  EXPECT_EQ(bash("de"), "demo detect deviation ");
   EXPECT_EQ(bash("room c"), "create ");
   EXPECT_EQ(bash("room create --o"), "--out ");
   EXPECT_EQ(bash("live --serve"), "--serve --serve-show ");

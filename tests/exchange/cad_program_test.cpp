@@ -1,5 +1,5 @@
 // limn-cad as a child process: its limits, its ends, and what is kept of a CAD file.
-#include "scene/cad_program.h"
+#include "scene/files/cad_program.h"
 
 #include <gtest/gtest.h>
 

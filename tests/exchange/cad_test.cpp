@@ -12,7 +12,7 @@
 #include <string>
 
 #include "exchange/cad_import.h"
-#include "scene/cad_program.h"
+#include "scene/files/cad_program.h"
 #include "scene/mesh.h"
 #include "tests/exchange/cad_folder.h"
 #include "tests/exchange/iges_text.h"

@@ -8,7 +8,7 @@
 
 #include "core/log.h"
 #include "exchange/zip.h"
-#include "scene/gltf_file.h"
+#include "scene/files/gltf_file.h"
 #include "scene/mesh_from_content.h"
 #include "tests/fuzz/fuzz_file.h"
 

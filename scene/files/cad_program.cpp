@@ -1,4 +1,4 @@
-#include "scene/cad_program.h"
+#include "scene/files/cad_program.h"
 
 #include <fcntl.h>
 #include <poll.h>

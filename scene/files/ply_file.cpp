@@ -1,4 +1,4 @@
-#include "scene/ply_file.h"
+#include "scene/files/ply_file.h"
 
 #include <algorithm>
 #include <cstdint>

@@ -1,4 +1,4 @@
-#include "scene/named_file.h"
+#include "scene/files/named_file.h"
 
 #include <algorithm>
 #include <cctype>

@@ -1,4 +1,4 @@
-#include "scene/draco_mesh.h"
+#include "scene/files/draco_mesh.h"
 
 #include <draco/compression/decode.h>
 

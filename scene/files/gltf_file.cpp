@@ -1,4 +1,4 @@
-#include "scene/gltf_file.h"
+#include "scene/files/gltf_file.h"
 
 #include <meshoptimizer.h>
 
@@ -9,7 +9,7 @@
 
 #include "core/file.h"
 #include "core/json_text.h"
-#include "scene/named_file.h"
+#include "scene/files/named_file.h"
 
 namespace limn::scene {
 namespace {
