@@ -190,6 +190,7 @@ TEST_F(OtherCad, WhatIsNotTheFilesFaultIsTriedAgain) {
 TEST_F(OtherCad, AnExceededLimitIsNamedWithTheOptionThatRaisesIt) {
   replace("exec sleep 100");
   exchange::CadImportOptions options{.file = folder / "hammer.iges", .out = folder / "hammer.glb"};
+  write("hammer.iges", "a file");
   ASSERT_TRUE(write_file(options.out, "the old part"));
   options.minutes = 0.01;
   const std::string text = exchange::import_cad(options).message();
