@@ -6,6 +6,7 @@
 #include "core/log.h"
 #include "core/print.h"
 #include "scene/mesh_content.h"
+#include "scene/files/source_file.h"
 
 namespace limn::exchange {
 namespace {
@@ -44,6 +45,7 @@ Status import_cad(const CadImportOptions& options) {
     return usage_error("--out: expected {} with --as {}, found '{}'.",
                        is_glb ? "a folder" : "a file NAME.glb", k_cad_taken_as.text(options.as),
                        options.out.string());
+  LIMN_TRY_STATUS(scene::check_regular_file(options.file));
   const double seconds = 60 * options.minutes;
   const scene::CadLimits limits{
       .seconds = seconds, .silent_seconds = k_silent_share * seconds, .memory_mb = 1024 * options.memory_gb};

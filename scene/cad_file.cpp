@@ -13,7 +13,7 @@
 #include "core/json_text.h"
 #include "core/user_folder.h"
 #include "core/utf8.h"
-#include "scene/files/fingerprint.h"
+#include "scene/files/source_file.h"
 #include "scene/read_gltf.h"
 
 namespace limn::scene {
@@ -31,15 +31,12 @@ json header_of(const fs::path& glb) {
   std::array<std::uint32_t, 5> head{};  // magic, version, length; the first chunk's length and type
   if (!in.read(reinterpret_cast<char*>(head.data()), sizeof(head))) return {};
   std::error_code none;
-  if (std::memcmp(head.data(), "glTF", 4) != 0 || head[3] > fs::file_size(glb, none)) return {};
+  const std::uintmax_t size = fs::file_size(glb, none);
+  // A file that was cut, as by a full disk or a copy that ended, is none.
+  if (std::memcmp(head.data(), "glTF", 4) != 0 || head[2] != size || head[3] > size) return {};
   std::string text(head[3], ' ');
   if (!in.read(text.data(), static_cast<std::streamsize>(text.size()))) return {};
   return json::parse(text, nullptr, false);
-}
-
-std::string fingerprint_of(const fs::path& file) {
-  const auto content = read_file(file);
-  return content ? fingerprint(*content) : "";
 }
 
 // The GLB if it was made with these options from the CAD file as it is.
@@ -48,12 +45,16 @@ std::optional<CadGlb> kept_glb(const fs::path& glb, const fs::path& file, const 
     const json header = header_of(glb);
     if (!header.is_object()) return std::nullopt;
     const json& made = header.at("asset").at("extras").at("limn_cad");
-    if (made.at("chord_mm") != options.chord_mm || made.at("angle_deg") != options.angle_deg)
+    if (made.value("format", 0) != k_cad_glb_format || made.at("chord_mm") != options.chord_mm ||
+        made.at("angle_deg") != options.angle_deg)
       return std::nullopt;
     const json& sources = made.at("sources");
+    if (sources.empty()) return std::nullopt;
     for (std::size_t i = 0; i < sources.size(); ++i) {
-      const fs::path source = i == 0 ? file : file.parent_path() / sources[i].at("name").get<std::string>();
-      if (fingerprint_of(source) != sources[i].at("fingerprint").get<std::string>()) return std::nullopt;
+      const auto name = sources[i].at("name").get<std::string>();
+      if (i > 0 && !stays_inside(name)) return std::nullopt;  // anybody may have written this file
+      const std::string now = file_fingerprint(i == 0 ? file : file.parent_path() / name);
+      if (now != sources[i].at("fingerprint").get<std::string>()) return std::nullopt;
     }
     return CadGlb{glb, made.at("metres_per_unit").get<double>(),
                   made.at("warnings").get<std::vector<std::string>>()};
@@ -62,10 +63,31 @@ std::optional<CadGlb> kept_glb(const fs::path& glb, const fs::path& file, const 
   }
 }
 
+// The CAD files in a file's folder with what changes when they do, if the file refers to others: which of
+// them a failure is about only limn-cad knows.
+json files_beside(const fs::path& file, const std::string& content) {
+  constexpr std::size_t k_most = 10000;
+  json files = json::object();
+  if (content.find("DOCUMENT_FILE") == std::string::npos) return files;
+  std::error_code none;
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : fs::path(".");
+  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, none), end;
+  for (std::size_t i = 0; !none && at != end && i < k_most; ++i, at.increment(none)) {
+    std::error_code gone;
+    if (is_cad_name(at->path()) && at->is_regular_file(gone))
+      files[as_utf8(at->path().string())] = {at->file_size(gone),
+                                             at->last_write_time(gone).time_since_epoch().count()};
+  }
+  return files;
+}
+
 // What tells whether reading a file would fail once more.
 json attempt_at(const fs::path& file, const CadOptions& options, const fs::path& program) {
   std::error_code none;
-  return {{"fingerprint", fingerprint_of(file)},
+  const auto read = read_file(file);
+  const std::string content = read ? *read : "";
+  return {{"fingerprint", fingerprint(content)},
+          {"beside", files_beside(file, content)},
           {"program", as_utf8(program.string())},
           {"program_bytes", fs::file_size(program, none)},
           {"chord_mm", options.chord_mm},
@@ -109,6 +131,7 @@ bool is_cad_cache_name(const fs::path& path) {
 }
 
 Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const std::stop_token& stop) {
+  LIMN_TRY_STATUS(check_regular_file(file));
   // A folder that was copied, or that cannot be written, may have the GLB beside the file.
   const fs::path beside = file.parent_path() / fmt::format(".{}.glb", file.filename().string());
   if (auto kept = kept_glb(beside, file, options)) return *kept;

@@ -32,9 +32,9 @@ struct CadGlb {
 
 /// The GLB of a CAD file. It is made by limn-cad and kept as `.FILE.glb` beside the file, or in the user's
 /// cache folder where the file's folder cannot be written, until the file, a file that it refers to or the
-/// options change. A file that cannot be read is not tried again until it changes (`.FILE.failed`); what
-/// is not the file's fault, such as a program that does not start, is tried again.
-/// Errors: as run_limn_cad().
+/// options change. A file that cannot be read is not tried again until it, or a CAD file beside one that
+/// refers to others, changes (`.FILE.failed`); what is not the file's fault, such as a program that does not
+/// start, is tried again. Errors: no regular file; as run_limn_cad().
 Result<CadGlb> cad_as_glb(const std::filesystem::path& file,
                           const CadOptions& options = {},
                           const std::stop_token& stop = {});

@@ -59,7 +59,8 @@ struct CadModel {
   double metres_per_unit = 1e-3;
   std::vector<CadMesh> meshes;
   std::vector<CadNode> nodes;
-  std::vector<CadSource> sources;
+  std::vector<CadSource> sources;  ///< As they were before they were read.
+  std::string changed_file;        ///< A source that was replaced while it was read; empty: none.
   std::vector<std::string> warnings;
   std::size_t triangle_count() const;  ///< A mesh counts at each of its places.
 };

@@ -8,6 +8,7 @@
 
 #include "core/file.h"
 #include "exchange/cad/cad_glb.h"
+#include "scene/files/source_file.h"
 
 namespace limn::cad {
 namespace {
@@ -21,7 +22,8 @@ ordered_json extras_of(const CadModel& model, const Tessellation& how) {
   for (const CadSource& source : model.sources)
     sources.push_back({{"name", source.name}, {"fingerprint", source.fingerprint}});
   return {{"limn_cad",
-           {{"chord_mm", how.chord_mm},
+           {{"format", scene::k_cad_glb_format},
+            {"chord_mm", how.chord_mm},
             {"angle_deg", how.angle_deg},
             {"metres_per_unit", model.metres_per_unit},
             {"sources", sources},

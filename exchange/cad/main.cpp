@@ -28,6 +28,7 @@
 #include "exchange/cad/read_curves.h"
 #include "exchange/cad/write_curves.h"
 #include "exchange/curves/curve_list.h"
+#include "scene/files/source_file.h"
 
 namespace limn::cad {
 namespace {
@@ -54,8 +55,9 @@ constexpr const char* k_help =
     "  --progress         Print lines \"progress PERCENT WHAT\" first\n"
     "  --memory-mb N      Take at most so much memory\n";
 
-// Exit codes (scene/files/cad_program.cpp): 1: a message says what is wrong with the file.
-constexpr int k_wrong_file = 1, k_wrong_usage = 2, k_no_memory = 3, k_not_written = 4;
+// Exit codes (scene/files/cad_program.cpp): 1: a message says what is wrong with the file; 4: with something
+// else.
+constexpr int k_wrong_file = 1, k_wrong_usage = 2, k_no_memory = 3, k_not_done = 4;
 
 struct Options {
   std::filesystem::path file, out;
@@ -172,7 +174,7 @@ struct Problem {
 };
 
 const Problem k_no_results = {"standard output: expected to write the results, found it closed or full.",
-                              k_not_written};
+                              k_not_done};
 
 std::optional<Problem> print_curves(const Options& options, int results, ProgressLines* progress) {
   CurveSampling how{.with_edges = options.edges};
@@ -189,7 +191,7 @@ std::optional<Problem> write_list(const Options& options, ProgressLines* progres
   const auto list = exchange::decode_curve_list(*text, options.file.string());
   if (!list) return Problem{list.message(), k_wrong_file};
   const Status written = write_curves(*list, options.out, progress);
-  if (!written) return Problem{written.message(), k_not_written};
+  if (!written) return Problem{written.message(), k_not_done};
   return std::nullopt;
 }
 
@@ -197,13 +199,21 @@ std::optional<Problem> run(const Options& options, int results) {
   Message::DefaultMessenger()->ChangePrinters().Clear();
   XCAFDoc_ShapeTool::SetAutoNaming(Standard_False);
   const Handle(ProgressLines) progress = new ProgressLines(options.progress ? results : -1);
+  if (const Status is_file = scene::check_regular_file(options.file); !is_file)
+    return Problem{is_file.message(), k_not_done};
   if (options.curves) return print_curves(options, results, progress.get());
   if (options.file.extension() == ".json") return write_list(options, progress.get());
   const auto model = read_cad_model(options.file, options.how, progress.get());
   if (!model) return Problem{model.message(), k_wrong_file};
+  if (!model->changed_file.empty())
+    return Problem{
+        fmt::format("{}: expected that its files stay as they are while limn-cad reads them, found "
+                    "'{}' changed. Try again.",
+                    options.file.string(), model->changed_file),
+        k_not_done};
   progress->begin_stage("writing", 95, 100);
   const auto written = write_parts(*model, options.as, options.how, options.out);
-  if (!written) return Problem{written.message(), k_not_written};
+  if (!written) return Problem{written.message(), k_not_done};
   const nlohmann::ordered_json report = cad_report(*model, options.how, *written);
   for (const std::string& warning : model->warnings)
     if (!options.json) std::cerr << "limn-cad: warning: " << warning << '\n';

@@ -13,6 +13,7 @@
 #include <opencascade/IGESData_IGESModel.hxx>
 #include <opencascade/Interface_Static.hxx>
 #include <opencascade/STEPCAFControl_Reader.hxx>
+#include <opencascade/STEPConstruct_ExternRefs.hxx>
 #include <opencascade/STEPControl_Reader.hxx>
 #include <opencascade/StepBasic_Product.hxx>
 #include <opencascade/StepBasic_ProductDefinition.hxx>
@@ -39,6 +40,8 @@
 
 #include "core/file.h"
 #include "core/utf8.h"
+#include "exchange/cad/step_places.h"
+#include "scene/files/source_file.h"
 
 namespace limn::cad {
 namespace {
@@ -59,6 +62,11 @@ std::string lower(std::string text) {
 Error damaged(const fs::path& path, const std::string& format, const std::string& found) {
   return error("{}: expected a whole {} file with shapes, found {}. Export it again.", path.string(), format,
                found);
+}
+
+// The file as it is before it is read: what is read later may be another file of that name.
+CadSource source_of(const fs::path& path) {
+  return {as_utf8(path.filename().string()), scene::file_fingerprint(path)};
 }
 
 // ---- STEP
@@ -191,14 +199,89 @@ void read_shape_names(const Handle(XSControl_WorkSession) & session,
   }
 }
 
+// The code page of a text that is not UTF-8. Chinese words (GBK) are at least two letters of two bytes each;
+// Western European letters outside ASCII are seldom so many in a row, and seldom in even numbers everywhere.
+const char* code_page(std::string_view text) {
+  std::size_t run = 0, longest = 0;
+  bool is_even = true;
+  for (const char c : text) {
+    const bool is_high = (static_cast<unsigned char>(c) & 0x80U) != 0;
+    if (!is_high) is_even = is_even && run % 2 == 0;
+    run = is_high ? run + 1 : 0;
+    longest = std::max(longest, run);
+  }
+  return is_even && longest >= 4 ? "GBK" : "CP1252";
+}
+
+// Says in which code page names are. OpenCASCADE takes them as UTF-8.
+Status set_code_page(const fs::path& path, OcctDocument* out) {
+  LIMN_TRY(const std::string content, read_file(path));
+  const std::string page = is_utf8(content) ? "UTF8" : code_page(content);
+  Interface_Static::SetCVal("read.step.codepage", page.c_str());
+  if (page != "UTF8")
+    out->warnings.push_back(fmt::format("names are not UTF-8, as STEP asks; they are taken as {}", page));
+  return {};
+}
+
+// The STEP files that a model refers to, and those to which they refer in turn.
+class References {
+ public:
+  References(const fs::path& path, OcctDocument* out) : path_(path), out_(out) {}
+
+  // `folder` is the file's, relative to the first one's. OpenCASCADE opens whatever a name says.
+  Status add(const Handle(XSControl_WorkSession) & session, const fs::path& folder) {
+    STEPConstruct_ExternRefs stated(session);
+    stated.LoadExternRefs();
+    for (Standard_Integer i = 1; i <= stated.NbExternRefs(); ++i) {
+      const Standard_CString name = stated.FileName(i);
+      if (name && *name) LIMN_TRY_STATUS(add_file(name, folder));
+    }
+    return {};
+  }
+
+ private:
+  Status add_file(std::string name, const fs::path& folder) {
+    const bool is_inside = scene::stays_inside(name);
+    std::replace(name.begin(), name.end(), '\\', '/');
+    const fs::path own = (folder / name).lexically_normal();
+    if (!known_.insert(own).second) return {};
+    const fs::path file = path_.parent_path() / own;
+    std::error_code none;
+    const bool is_there = fs::exists(file, none);
+    if (is_there && (!is_inside || !fs::is_regular_file(file, none)))
+      return error(
+          "{}: expected that it refers only to files in its folder, found '{}'. Put that file beside it.",
+          path_.string(), as_utf8(name));
+    if (!is_there)
+      out_->warnings.push_back(
+          fmt::format("'{}', a file that it refers to, is absent; its shapes are left out", as_utf8(name)));
+    if (!is_inside) return {};
+    out_->sources.push_back({as_utf8(own.string()), scene::file_fingerprint(file)});
+    if (!is_there) return {};
+    const Handle(XSControl_WorkSession) session = new XSControl_WorkSession;
+    session->SelectNorm("STEP");
+    STEPControl_Reader reader(session, Standard_False);
+    if (reader.ReadFile(fs::absolute(file).c_str()) == IFSelect_RetDone)
+      return add(session, own.parent_path());
+    out_->warnings.push_back(fmt::format(
+        "'{}', a file that it refers to, cannot be parsed; its shapes are left out", as_utf8(name)));
+    return {};
+  }
+
+  const fs::path& path_;
+  OcctDocument* out_;
+  std::set<fs::path> known_;
+};
+
 Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
-  OcctDocument out{.document = new_document(), .format = "STEP"};
+  OcctDocument out{.document = new_document(), .format = "STEP", .sources = {source_of(path)}};
   STEPCAFControl_Reader reader;
   reader.SetLayerMode(false);
   reader.SetPropsMode(false);
   reader.SetGDTMode(false);
   reader.SetMatMode(false);
   reader.SetViewMode(false);
+  LIMN_TRY_STATUS(set_code_page(path, &out));
   if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
     return damaged(path, "STEP", "one that cannot be parsed");
   const Handle(StepData_StepModel) model = reader.ChangeReader().StepModel();
@@ -208,14 +291,13 @@ Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
   if (const std::string circle = circle_in(model); !circle.empty())
     return error("{}: expected an assembly that does not contain itself, found {}. Remove one of these uses.",
                  path.string(), circle);
+  warn_of_places(model, &out.warnings);
+  LIMN_TRY_STATUS(References(path, &out).add(reader.ChangeReader().WS(), {}));
   progress->begin_stage("translating", k_read_percent, k_transferred_percent);
   out.unread = unread_shapes(model);
   if (!reader.Transfer(out.document, progress->Start()) && out.unread.empty())
     return damaged(path, "STEP", "no shapes");
   read_shape_names(reader.ChangeReader().WS(), model, &out.shape_names);
-  NCollection_DataMap<TCollection_AsciiString, Handle(STEPCAFControl_ExternFile)>::Iterator other(
-      reader.ExternFiles());
-  for (; other.More(); other.Next()) out.other_files.emplace_back(other.Key().ToCString());
   return out;
 }
 
@@ -260,7 +342,7 @@ bool has_empty_name(const IGESData_IGESModel& model) {
 }
 
 Result<OcctDocument> read_iges(const fs::path& path, ProgressLines* progress) {
-  OcctDocument out{.document = new_document(), .format = "IGES"};
+  OcctDocument out{.document = new_document(), .format = "IGES", .sources = {source_of(path)}};
   LIMN_TRY(const std::string content, read_file(path));
   if (!has_iges_end(content)) return damaged(path, "IGES", "one whose end is missing");
   IGESCAFControl_Reader reader;

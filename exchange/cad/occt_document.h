@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "exchange/cad/cad_model.h"
 #include "exchange/cad/progress_lines.h"
 
 namespace limn::cad {
@@ -22,9 +23,9 @@ struct OcctDocument {
   Handle(TDocStd_Document) document;
   std::string format = {}, schema = {}, unit = {};  ///< As CadModel's.
   double metres_per_unit = 1e-3;
-  std::vector<std::string> other_files = {};  ///< STEP files that it refers to, relative to its folder.
-  ShapeNames shape_names = {};                ///< The document itself names only products.
-  std::string unread = {};                    ///< Kinds of shapes that are in the file but are not read.
+  std::vector<CadSource> sources = {};  ///< The file and those that it refers to, before they were read.
+  ShapeNames shape_names = {};          ///< The document itself names only products.
+  std::string unread = {};              ///< Kinds of shapes that are in the file but are not read.
   std::vector<std::string> warnings = {};
 };
 
@@ -34,8 +35,9 @@ std::string a_file(const std::string& format);
 /// An empty document.
 Handle(TDocStd_Document) new_document();
 
-/// Reads a STEP or IGES file, in the format that its name ends in. Errors: not readable, damaged, without
-/// shapes, an assembly that contains itself.
+/// Reads a STEP or IGES file, in the format that its name ends in, and the STEP files below its folder that
+/// it refers to. Errors: not readable, damaged, without shapes, an assembly that contains itself, a reference
+/// to a file elsewhere.
 Result<OcctDocument> read_document(const std::filesystem::path& path, ProgressLines* progress);
 
 }  // namespace limn::cad

@@ -18,7 +18,7 @@
 #include "exchange/cad/leaves.h"
 #include "exchange/cad/occt_document.h"
 #include "exchange/cad/triangles.h"
-#include "scene/files/fingerprint.h"
+#include "scene/files/source_file.h"
 
 namespace limn::cad {
 namespace {
@@ -157,17 +157,13 @@ double sufficient_chord_mm(const Tessellation& how, double triangles) {
   return 10 * decade;
 }
 
-Result<std::vector<CadSource>> sources_of(const fs::path& path, const std::vector<std::string>& others) {
-  std::vector<CadSource> sources;
-  LIMN_TRY(const std::string content, read_file(path));
-  sources.push_back({as_utf8(path.filename().string()), scene::fingerprint(content)});
-  for (const std::string& other : others) {
-    const fs::path file = path.parent_path() / other;
-    const auto inside = read_file(file);
-    sources.push_back({as_utf8(file.lexically_relative(path.parent_path()).string()),
-                       inside ? scene::fingerprint(*inside) : ""});
-  }
-  return sources;
+// The first source that is no more as it was; empty: all are.
+std::string changed_source(const fs::path& path, const std::vector<CadSource>& sources) {
+  for (std::size_t i = 0; i < sources.size(); ++i)
+    if (scene::file_fingerprint(i == 0 ? path : path.parent_path() / sources[i].name) !=
+        sources[i].fingerprint)
+      return sources[i].name;
+  return "";
 }
 
 // Builds the model leaf by leaf.
@@ -309,7 +305,8 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
   model.schema = document.schema;
   model.unit = document.unit;
   model.metres_per_unit = document.metres_per_unit;
-  LIMN_TRY(model.sources, sources_of(path, document.other_files));
+  model.sources = document.sources;
+  model.changed_file = changed_source(path, model.sources);
   return model;
 }
 

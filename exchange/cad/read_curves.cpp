@@ -9,8 +9,10 @@
 #include <opencascade/TopExp.hxx>
 #include <opencascade/TopExp_Explorer.hxx>
 #include <opencascade/TopTools_IndexedMapOfShape.hxx>
+#include <opencascade/TopTools_MapOfShape.hxx>
 #include <opencascade/TopoDS.hxx>
 #include <opencascade/TopoDS_Edge.hxx>
+#include <opencascade/TopoDS_Iterator.hxx>
 #include <opencascade/TopoDS_Wire.hxx>
 #include <opencascade/XCAFDoc_ShapeTool.hxx>
 #include <set>
@@ -97,6 +99,40 @@ std::vector<Eigen::Vector3d> points_of(const TopoDS_Edge& edge, double chord_mm)
   return points;
 }
 
+using Points = std::vector<Eigen::Vector3d>;
+
+// Lines joined to chains where their ends meet.
+std::vector<Points> chains_of(std::vector<Points> lines) {
+  constexpr double k_meet_mm = 1e-4;
+  constexpr std::size_t k_most = 5000;  // more stay apart: each is compared with each
+  if (lines.size() > k_most) return lines;
+  const auto meet = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return (a - b).norm() <= k_meet_mm;
+  };
+  std::vector<Points> chains;
+  while (!lines.empty()) {
+    Points chain = std::move(lines.front());
+    lines.erase(lines.begin());
+    for (std::size_t i = 0; i < lines.size();) {
+      Points& next = lines[i];
+      if (meet(chain.front(), next.front()) || meet(chain.back(), next.back()))
+        std::reverse(next.begin(), next.end());
+      if (meet(chain.back(), next.front())) {
+        chain.insert(chain.end(), next.begin(), next.end());
+      } else if (meet(chain.front(), next.back())) {
+        chain.insert(chain.begin(), next.begin(), next.end());
+      } else {
+        ++i;
+        continue;
+      }
+      lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(i));
+      i = 0;
+    }
+    chains.push_back(std::move(chain));
+  }
+  return chains;
+}
+
 // The curves of a file, as they are collected.
 class Curves {
  public:
@@ -132,13 +168,23 @@ class Curves {
                 const gp_Trsf& placed,
                 const std::string& product,
                 const ShapeNames& names) {
-    std::vector<Eigen::Vector3d> points;
-    std::string name = name_of(wire, product, names);
+    Points points;
+    TopTools_MapOfShape followed;
+    const std::string name = name_of(wire, product, names);
     for (BRepTools_WireExplorer at(wire); at.More(); at.Next()) {
       const std::vector<Eigen::Vector3d> more = points_of(at.Current(), how_.chord_mm);
       points.insert(points.end(), more.begin(), more.end());
+      followed.Add(at.Current());
     }
     add(std::move(points), placed, name);
+    // The explorer ends at a branch and at a gap.
+    std::vector<Points> rest;
+    for (TopoDS_Iterator at(wire); at.More(); at.Next()) {
+      if (at.Value().ShapeType() != TopAbs_EDGE || followed.Contains(at.Value())) continue;
+      Points more = points_of(TopoDS::Edge(at.Value()), how_.chord_mm);
+      if (!more.empty()) rest.push_back(std::move(more));
+    }
+    for (Points& chain : chains_of(std::move(rest))) add(std::move(chain), placed, name);
   }
 
   void add(std::vector<Eigen::Vector3d> points, const gp_Trsf& placed, const std::string& name) {
@@ -189,7 +235,8 @@ Result<exchange::CurveList> read_curves(const fs::path& path,
   }
   if (curves.all.empty())
     return error("{}: expected {} with curves, found {}. Export the curves themselves{}.", path.string(),
-                 a_file(document.format), how.with_edges ? "none" : "none that bounds no surface",
+                 a_file(document.format),
+                 how.with_edges ? "none" : "none that bounds no surface and whose segments meet",
                  how.with_edges ? "" : ", or read the edges of surfaces (--edges)");
   return exchange::CurveList{.curves = std::move(curves.all), .warnings = document.warnings};
 }

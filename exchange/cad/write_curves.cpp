@@ -1,5 +1,8 @@
 #include "exchange/cad/write_curves.h"
 
+#include <unistd.h>
+
+#include <cstdlib>
 #include <opencascade/BRepBuilderAPI_MakeEdge.hxx>
 #include <opencascade/GeomAPI_Interpolate.hxx>
 #include <opencascade/Geom_BSplineCurve.hxx>
@@ -118,7 +121,11 @@ Status write_curves(const exchange::CurveList& list, const fs::path& path, Progr
   Interface_Static::SetCVal("write.step.unit", "MM");
   STEPCAFControl_Writer writer;
   if (!writer.Transfer(document, STEPControl_AsIs)) return not_written(path, "curves that it cannot express");
-  const fs::path raw = path.string() + ".part";
+  std::string name = path.string() + ".XXXXXX";  // a name that nobody has
+  const int descriptor = mkstemp(name.data());
+  if (descriptor < 0) return not_written(path, "a folder that cannot be written or is full");
+  close(descriptor);
+  const fs::path raw = name;
   std::error_code none;
   const bool is_written = writer.Write(raw.c_str()) == IFSelect_RetDone;
   const auto text = read_file(raw);

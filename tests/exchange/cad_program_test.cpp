@@ -65,6 +65,23 @@ TEST_F(Cad, WhatWasKeptIsMadeAgainWhenTheFileChanges) {
   EXPECT_NE(fs::last_write_time(kept), first);
 }
 
+TEST_F(Cad, AKeptGlbThatWasCutOrIsOfAnotherVersionIsMadeAgain) {
+  const fs::path file = write("box.step", box_file("mm", "AUTOMOTIVE_DESIGN")),
+                 kept = folder / ".box.step.glb";
+  load(file);
+  const std::string whole = read_file(kept).value();
+  ASSERT_TRUE(write_file(kept, whole.substr(0, whole.size() - 40)));
+  EXPECT_EQ(load(file).triangles.size(), 12u);
+  EXPECT_EQ(read_file(kept).value(), whole);
+  std::string old = whole;
+  const std::size_t at = old.find("\"format\":");
+  ASSERT_NE(at, std::string::npos);
+  old[at + 9] = '1';
+  ASSERT_TRUE(write_file(kept, old));
+  load(file);
+  EXPECT_EQ(read_file(kept).value(), whole);
+}
+
 TEST_F(Cad, AGivenUnitReplacesTheFiles) {
   const fs::path file = write("box.step", box_file("inch", "AUTOMOTIVE_DESIGN"));
   EXPECT_NEAR(size_of(load(file)).x(), 2.54, 1e-4);
@@ -103,6 +120,19 @@ TEST_F(OtherCad, AProgramThatHangsIsEnded) {
   const auto pid = read_file(folder / "pid");
   ASSERT_TRUE(pid);
   EXPECT_FALSE(fs::exists("/proc/" + std::to_string(std::stoi(*pid)))) << "it still runs";
+}
+
+TEST_F(OtherCad, AProgramThatClosesItsOutputAndGoesOnIsEnded) {
+  replace("exec >&- 2>&-; exec sleep 100");
+  EXPECT_NE(refusal_of({.seconds = 0.5}).find("within 0.5 s, found"), std::string::npos);
+}
+
+TEST_F(OtherCad, ATimeThatItWaitedIsNotKeptAgainstAFile) {
+  const fs::path file = write("slow.step", "one");
+  replace("exec sleep 100");
+  EXPECT_FALSE(scene::try_limn_cad(file, {}, {.seconds = 0.3}).fails_again);
+  replace("while true; do :; done");
+  EXPECT_FALSE(scene::try_limn_cad(file, {}, {.seconds = 0.3}).report);
 }
 
 TEST_F(OtherCad, ProgressKeepsItAlive) {
@@ -160,6 +190,7 @@ TEST_F(OtherCad, WhatIsNotTheFilesFaultIsTriedAgain) {
 TEST_F(OtherCad, AnExceededLimitIsNamedWithTheOptionThatRaisesIt) {
   replace("exec sleep 100");
   exchange::CadImportOptions options{.file = folder / "hammer.iges", .out = folder / "hammer.glb"};
+  write("hammer.iges", "a file");
   ASSERT_TRUE(write_file(options.out, "the old part"));
   options.minutes = 0.01;
   const std::string text = exchange::import_cad(options).message();

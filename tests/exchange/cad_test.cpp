@@ -1,5 +1,6 @@
 // STEP and IGES files: what limn-cad makes of files whose truth is known, as meshes load them.
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <string>
+#include <tuple>
 
 #include "exchange/cad_import.h"
 #include "scene/files/cad_program.h"
@@ -356,6 +358,95 @@ TEST_F(Cad, TooManyTrianglesAreRefusedWithAChordErrorThatWouldDo) {
   const auto coarse = scene::run_limn_cad(file, arguments);
   ASSERT_TRUE(coarse) << coarse.message();
   EXPECT_GT(json::parse(*coarse)["triangles"].get<std::size_t>(), 1000u);
+}
+
+TEST_F(Cad, WhatIsNoFileIsNamedAsSuch) {
+  exchange::CadImportOptions options{.file = folder / "absent.step", .out = folder / "out.glb"};
+  const auto says = [&](const char* part) {
+    const Status imported = exchange::import_cad(options);
+    ASSERT_FALSE(imported);
+    EXPECT_NE(imported.message().find(part), std::string::npos) << imported.message();
+    const auto alone = scene::run_limn_cad(options.file, {"--out", options.out.string()}, {.seconds = 5});
+    ASSERT_FALSE(alone);
+    EXPECT_NE(alone.message().find(part), std::string::npos) << alone.message();
+  };
+  says("absent.step: expected a file, found no file");
+  options.file = folder / "pipe.step";
+  ASSERT_EQ(mkfifo(options.file.c_str(), 0600), 0);
+  says("pipe.step: expected a file, found a pipe");
+  options.file = folder / "folder.step";
+  fs::create_directory(options.file);
+  says("folder.step: expected a file, found a folder");
+}
+
+// An assembly of a box and of a part in a file of its own.
+std::string with_reference(const std::string& name) {
+  StepText step;
+  const auto whole = step.assembly("whole");
+  step.place(whole, step.part("box", {step.box({1, 2, 3})}), {0, 0, 0}, "a");
+  const auto other = step.assembly("other");
+  step.place(whole, other, {10, 0, 0}, "b");
+  step.refer(other, name);
+  return step.file();
+}
+
+TEST_F(Cad, FilesThatAFileRefersToAreReadBelowItsFolderAlone) {
+  StepText part;
+  part.part("part", {part.box({5, 5, 5})});
+  write("part.step", part.file());
+  fs::create_directories(folder / "in" / "sub");
+  write("in/sub/part.step", part.file());
+  EXPECT_EQ(report(write("in/good.step", with_reference("sub/part.step")))["solids"].size(), 2u);
+  for (const std::string& name : {std::string("../part.step"), std::string("sub\\\\..\\\\..\\\\part.step"),
+                                  (folder / "part.step").string(), std::string("/dev/zero")}) {
+    const std::string text = refusal(write("in/bad.step", with_reference(name)));
+    EXPECT_NE(text.find("bad.step: expected that it refers only to files in its folder"), std::string::npos)
+        << name << ": " << text;
+  }
+  const fs::path late = write("in/late.step", with_reference("gone.step"));
+  const json without = report(late);
+  EXPECT_EQ(without["solids"].size(), 1u);
+  EXPECT_NE(without["warnings"].dump().find("'gone.step', a file that it refers to, is absent"),
+            std::string::npos)
+      << without["warnings"];
+  EXPECT_EQ(load(late).triangles.size(), 12u);
+  write("in/gone.step", part.file());
+  EXPECT_EQ(load(late).triangles.size(), 24u) << "what was kept without the part";
+  write("in/gone.step", "no STEP file");
+  EXPECT_NE(report(late)["warnings"].dump().find("'gone.step', a file that it refers to, cannot be parsed"),
+            std::string::npos);
+}
+
+TEST_F(Cad, NamesInOldCodePagesAreRead) {
+  const auto name_of = [&](const std::string& bytes) {
+    StepText step;
+    step.part(bytes, {step.box({1, 2, 3})});
+    const json found = report(write("name.step", step.file()));
+    EXPECT_NE(found["warnings"].dump().find("names are not UTF-8"), std::string::npos) << found["warnings"];
+    return found["solids"][0]["name"].get<std::string>();
+  };
+  EXPECT_EQ(name_of("Fen\xEAtre"), "Fen\xC3\xAAtre");
+  EXPECT_EQ(name_of("\xC1\xE3\xBC\xFE"), "\xE9\x9B\xB6\xE4\xBB\xB6");  // GBK: part
+}
+
+TEST_F(Cad, PlacesThatAreMirroredOrScaledAreNamed) {
+  for (const auto& [z, scale, what] :
+       {std::tuple(-1., "1.", "mirrored"), std::tuple(1., "2.", "scaled by 2"), std::tuple(1., "1.", "")}) {
+    StepText step;
+    const auto door = step.part("door", {step.box({1, 2, 3})});
+    const int map = step.add("REPRESENTATION_MAP(#{},#{})", step.frame({0, 0, 0}), door.representation);
+    const int x = step.direction({1, 0, 0}), y = step.direction({0, 1, 0}), up = step.direction({0, 0, z});
+    const int origin = step.point({5, 0, 0});
+    const int placed = step.add("CARTESIAN_TRANSFORMATION_OPERATOR_3D('','','',#{},#{},#{},{},#{})", x, y,
+                                origin, scale, up);
+    step.product("pair", {step.add("MAPPED_ITEM('left door',#{},#{})", map, placed)}, "SHAPE_REPRESENTATION");
+    const std::string warnings = report(write("pair.step", step.file()))["warnings"].dump();
+    if (*what)
+      EXPECT_NE(warnings.find(fmt::format("'left door': a place is {}", what)), std::string::npos)
+          << warnings;
+    else
+      EXPECT_EQ(warnings, "[]");
+  }
 }
 
 // Whatever is changed in a file: a report, or one sentence; never a hang. tools/fuzz_cad does it for minutes.

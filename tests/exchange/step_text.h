@@ -97,6 +97,17 @@ class StepText {
     add("CONTEXT_DEPENDENT_SHAPE_REPRESENTATION(#{},#{})", relation, shape);
   }
 
+  /// Says that a product's shape is in another file.
+  void refer(const Product& what, const std::string& name) {
+    const int type = add("DOCUMENT_TYPE('geometry')");
+    const int document = add("DOCUMENT_FILE('{}','','',#{},'',$)", name, type);
+    add("APPLIED_DOCUMENT_REFERENCE(#{},'',(#{}))", document, what.definition);
+    const int role = add("IDENTIFICATION_ROLE('external document id and location','')");
+    const int source = add("EXTERNAL_SOURCE(IDENTIFIER(''))");
+    add("APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT('{}',#{},#{},(#{}))", name, role, source, document);
+    add("DOCUMENT_REPRESENTATION_TYPE('digital',#{})", document);
+  }
+
   /// The colour of a solid or a face, in sRGB.
   void paint(int item, const Point& srgb) {
     const int colour = add("COLOUR_RGB('',{:.6f},{:.6f},{:.6f})", srgb[0], srgb[1], srgb[2]);
