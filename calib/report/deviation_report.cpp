@@ -67,9 +67,16 @@ std::vector<std::string> deviation_warnings(const Deviation& deviation,
         "(a hand, a cable), or the prototype differs more. They are not measured; --reach-mm takes "
         "larger differences.",
         1e4 * beyond, 1e3 * deviation.reach_m));
+  if (deviation.facing_away_m2 > 1e-4)
+    warnings.push_back(fmt::format(
+        "{:.1f} cm2 of the CAD lie on the scan's surface and face the other way: their triangles are inside "
+        "out, or they are the back of a thin sheet. They are not measured. Turn the CAD's triangles "
+        "outwards.",
+        1e4 * deviation.facing_away_m2));
   if (!deviation.noise_was_stated)
     warnings.emplace_back(
-        "the scan states no standard deviations: they are estimated from how much its surface scatters.");
+        "the scan states no standard deviations, or some that are not above 0: they are estimated from how "
+        "much its surface scatters.");
   else if (deviation.noise_factor > k_noisy)
     warnings.push_back(fmt::format(
         "the scan's surface scatters {:.1f} times as much as its standard deviations say; they are "

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <tuple>
 #include <unordered_map>
 
 #include "core/median.h"
@@ -69,11 +70,22 @@ double edge_length_of(const scene::ScanSurface& scan) {
   return static_cast<double>(median(std::move(lengths)));
 }
 
+// Whether every point of the scan states a standard deviation that can be one.
+bool states_noise(const scene::ScanSurface& scan) {
+  return !scan.stddevs.empty() && std::all_of(scan.stddevs.begin(), scan.stddevs.end(), [](float stddev) {
+    return std::isfinite(stddev) && stddev > 0;
+  });
+}
+
 // The scan, prepared for lines that meet it.
 class ScanTarget {
  public:
   explicit ScanTarget(const scene::ScanSurface& scan)
-      : scan_(scan), mesh_(target_mesh(scan)), index_(mesh_), at_edge_(vertices_at_edges(scan)) {}
+      : scan_(scan),
+        mesh_(target_mesh(scan)),
+        index_(mesh_),
+        at_edge_(vertices_at_edges(scan)),
+        states_noise_(states_noise(scan)) {}
 
   struct Met {
     double distance = 0;  // along the line
@@ -102,6 +114,12 @@ class ScanTarget {
     return std::nullopt;
   }
 
+  // Whether the scan's surface at p faces against n: the CAD's triangle there is inside out.
+  bool faces_away(const Vector3d& p, const Vector3d& n, double within) const {
+    const Vector3d against = -n;
+    return index_.nearest(p, within, &against, k_line_facing).has_value();
+  }
+
   bool is_at_edge(std::size_t triangle) const {
     const auto& [a, b, c] = scan_.triangles[triangle];
     return at_edge_[a] || at_edge_[b] || at_edge_[c];
@@ -109,7 +127,7 @@ class ScanTarget {
 
   // The mean of the corners' standard deviations along the scan's normal; 1 m where none are stated.
   double stddev(std::size_t triangle) const {
-    if (scan_.stddevs.empty()) return 1;
+    if (!states_noise_) return 1;
     const auto& [a, b, c] = scan_.triangles[triangle];
     return static_cast<double>(scan_.stddevs[a] + scan_.stddevs[b] + scan_.stddevs[c]) / 3;
   }
@@ -125,6 +143,7 @@ class ScanTarget {
   scene::Mesh mesh_;
   scene::MeshBvh index_;
   std::vector<bool> at_edge_;
+  bool states_noise_;
 };
 
 // Distances, and the stated standard deviations of the scan alone.
@@ -136,6 +155,7 @@ Status compare_along_normals(const ScanTarget& target,
   out->distances_m.assign(count, k_none);
   out->stddevs_m.assign(count, k_none);
   out->states.assign(count, DeviationState::not_measured);
+  std::vector<std::uint8_t> faces_away(count, 0);
   constexpr std::size_t k_block = 20'000;  // points between two reports
   for (std::size_t begin = 0; begin < count; begin += k_block) {
     LIMN_TRY_STATUS(reported(
@@ -147,7 +167,10 @@ Status compare_along_normals(const ScanTarget& target,
         const Vector3d p = world_from_prototype * out->cad.surface.positions[i].cast<double>();
         const Vector3d n = world_from_prototype.rotation * out->cad.surface.normals[i].cast<double>();
         const auto met = target.meet(p, n, k_beyond_reaches * out->reach_m);
-        if (!met || target.is_at_edge(met->triangle)) continue;
+        if (!met || target.is_at_edge(met->triangle)) {
+          faces_away[i] = !met && target.faces_away(p, n, out->tolerance_m);
+          continue;
+        }
         if (std::abs(met->distance) > out->reach_m) {
           out->states[i] = DeviationState::beyond_reach;
           continue;
@@ -158,6 +181,8 @@ Status compare_along_normals(const ScanTarget& target,
       }
     });
   }
+  for (std::size_t i = 0; i < count; ++i)
+    if (faces_away[i] != 0) out->facing_away_m2 += static_cast<double>(out->cad.areas_m2[i]);
   return {};
 }
 
@@ -270,13 +295,29 @@ void add_registration(const Registration& registration, const Neighbourhood& aro
   out->stddevs_m = std::move(sums);
 }
 
-// The points that share a triangle with each point.
+// The points that share a triangle with each point, or its place: where a CAD has an edge or a seam, or its
+// triangles share nothing, several points lie at one place.
 std::vector<std::vector<std::uint32_t>> neighbours_of(const scene::ScanSurface& surface) {
-  std::vector<std::vector<std::uint32_t>> of(surface.positions.size());
+  const std::size_t count = surface.positions.size();
+  std::vector<std::vector<std::uint32_t>> of(count);
   for (const auto& [a, b, c] : surface.triangles) {
     of[a].insert(of[a].end(), {b, c});
     of[b].insert(of[b].end(), {a, c});
     of[c].insert(of[c].end(), {a, b});
+  }
+  std::vector<std::uint32_t> by_place(count);
+  std::iota(by_place.begin(), by_place.end(), 0U);
+  const auto place = [&](std::uint32_t i) {
+    const Vector3f& p = surface.positions[i];
+    return std::tuple(p.x(), p.y(), p.z());
+  };
+  std::sort(by_place.begin(), by_place.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
+  for (std::size_t k = 1; k < count; ++k) {
+    const std::uint32_t a = by_place[k - 1], b = by_place[k];
+    if (place(a) != place(b)) continue;
+    of[a].push_back(b);
+    of[b].push_back(a);
   }
   return of;
 }
@@ -302,7 +343,7 @@ Result<Deviation> deviation(const scene::Mesh& cad,
   Deviation out;
   out.tolerance_m = options.tolerance_m;
   out.reach_m = options.reach_m;
-  out.noise_was_stated = !scan.stddevs.empty();
+  out.noise_was_stated = states_noise(scan);
   const double spacing = options.spacing_m > 0 ? options.spacing_m : edge_length_of(scan);
   out.cad = surface_samples(cad, spacing, options.most_samples);
   {
@@ -316,8 +357,10 @@ Result<Deviation> deviation(const scene::Mesh& cad,
         "expected the scan's surface within {:.3g} mm of the CAD, found none. Check the pose, the units, and "
         "that the CAD's triangles are not inside out.",
         1e3 * options.reach_m);
-  const Neighbourhood around(out, k_around * out.cad.spacing_m);
-  const double factor = noise_factor(out, around, out.cad.spacing_m);
+  // Points within one triangle of the scan share its errors: its scatter shows between its triangles.
+  const double grain = std::max(out.cad.spacing_m, edge_length_of(scan));
+  const Neighbourhood around(out, k_around * grain);
+  const double factor = noise_factor(out, around, grain);
   out.noise_factor = out.noise_was_stated ? std::max(1.0, factor) : 1;
   for (float& stddev : out.stddevs_m)
     stddev *= static_cast<float>(out.noise_was_stated ? out.noise_factor : factor);

@@ -48,7 +48,12 @@ struct Deviation {
   /// The scan's noise as a multiple of its stated standard deviations, at least 1. It is estimated from how
   /// much the distances scatter about their neighbourhood.
   double noise_factor = 1;
-  bool noise_was_stated = true;  ///< False: the scan has no standard deviations; they come from the scatter.
+  /// False: the scan has no standard deviations, or some that are not positive numbers; they come from the
+  /// scatter.
+  bool noise_was_stated = true;
+  /// Area that is not measured, with scan within the tolerance that faces the other way: triangles of the CAD
+  /// that are inside out, or the back of a sheet that is thinner than the tolerance.
+  double facing_away_m2 = 0;
   double tolerance_m = 0.5e-3;
   double reach_m = 5e-3;
 

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "apps/scan.h"
 #include "calib/surface/surface_samples.h"
@@ -16,6 +17,7 @@
 #include "scene/scan_surface.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
+#include "tests/calib/scanned_panel.h"
 #include "tests/support/matchers.h"
 #include "tests/support/meshes.h"
 #include "tests/support/text.h"
@@ -280,6 +282,55 @@ TEST_F(DoorDeviation, RefusesOtherUnitsAnotherObjectAndNoCad) {
   with.files.align.scene = own / "bare";
   test::expect_contains(run_deviation(with).message(), "expected a prototype");
   EXPECT_FALSE(fs::exists(with.files.align.out));
+}
+
+// A panel's CAD and its scan, whose size is `size` times the CAD's, as files of `folder`; they are aligned.
+DeviationCommand panel_command(const fs::path& folder,
+                               const test::PanelShape& shape,
+                               const std::vector<test::Bump>& bumps,
+                               double size) {
+  auto rng = test::test_rng();
+  const scene::Mesh mesh = test::panel_mesh(shape, 60, 40);
+  scene::ScanSurface cad, scan = test::scan_of_panel(shape, bumps, {.spacing_m = 2e-3}, rng);
+  cad.positions = mesh.positions;
+  cad.triangles = mesh.triangles;
+  for (Eigen::Vector3f& p : scan.positions) p *= static_cast<float>(size);
+  EXPECT_TRUE(scene::save_ply(cad, folder / "cad.ply").ok());
+  EXPECT_TRUE(scene::save_ply(scan, folder / "scan.ply").ok());
+  DeviationCommand command;
+  command.files.align.scan = folder / "scan.ply";
+  command.files.align.mesh = folder / "cad.ply";
+  command.files.align.units = scene::LengthUnit::metre;
+  command.files.align.start =
+      test::write_json(folder / "start.json", {{"world_from_prototype", to_json(Pose())}});
+  command.files.align.out = folder / "out";
+  return command;
+}
+
+// A pose from limn align says which directions are free; the flanks of a bump are unsure as with a fit.
+TEST(DeviationFiles, APoseThatIsTrustedMaySlide) {
+  const fs::path own = test::test_folder();
+  DeviationCommand command = panel_command(own, test::flat, {{0, 0, 0.02, 3e-3}}, 1);
+  wizard::AlignOptions align = command.files.align;
+  align.out = own / "aligned";
+  ASSERT_TRUE(wizard::align_scan(align).ok());
+  command.files.align.start = own / "aligned/align.json";
+  command.no_align = true;
+  const Status done = run_deviation(command);
+  ASSERT_TRUE(done.ok()) << done.message();
+  const auto json = test::read_json(own / "out/deviation.json");
+  EXPECT_EQ(json["alignment"]["free_directions"].size(), 3U);
+  EXPECT_GT(json["areas_cm2"]["uncertain"].get<double>(), 3);
+  EXPECT_GT(json["areas_cm2"]["measured"].get<double>(), 400) << "the plain part is sure";
+  test::expect_contains(json["warnings"].dump(), "hatched");
+}
+
+TEST(DeviationFiles, TellOfAScanOfAnotherSize) {
+  const fs::path own = test::test_folder();
+  const DeviationCommand command = panel_command(own, test::shaped, {}, 1.01);
+  const Status done = run_deviation(command);
+  ASSERT_TRUE(done.ok()) << done.message();
+  test::expect_contains(test::read_json(own / "out/deviation.json")["warnings"].dump(), "times as large");
 }
 
 TEST(DeviationOptions, AreCheckedFirst) {

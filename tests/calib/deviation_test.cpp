@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -193,6 +194,88 @@ TEST(Deviation, KnowsTheNoiseBetterThanTheScan) {
     ASSERT_FALSE(warnings.empty());
     expect_contains(warnings.back(), stated > 0 ? "times as much" : "states no standard deviations");
   }
+}
+
+// Some programs export zeros, or nothing that is a number.
+TEST(Deviation, EstimatesTheNoiseWhereTheStatedOneCannotBe) {
+  auto rng = test_rng();
+  const scene::Mesh cad = panel_mesh(shaped, 40, 28);
+  const scene::ScanSurface scan = scan_of_panel(shaped, {}, {.spacing_m = 2e-3}, rng);
+  for (const float stated : {0.f, -1.f, std::numeric_limits<float>::quiet_NaN()}) {
+    scene::ScanSurface odd = scan;
+    for (std::size_t i = 0; i < odd.stddevs.size(); i += 7) odd.stddevs[i] = stated;
+    const auto found = deviation(cad, odd, Registration());
+    ASSERT_TRUE(found.ok()) << found.message();
+    EXPECT_FALSE(found->noise_was_stated);
+    EXPECT_GT(errors_of(*found, {}).count, 3000);
+    for (std::size_t i = 0; i < found->states.size(); ++i) {
+      const float stddev = found->stddevs_m[i];
+      EXPECT_TRUE(!found->has(i) || (stddev > 1e-6f && stddev < 1e-3f)) << i << ": " << stddev;
+    }
+  }
+}
+
+TEST(Deviation, TellsOfTrianglesThatAreInsideOut) {
+  auto rng = test_rng();
+  const scene::Mesh plain = panel_mesh(shaped, 40, 28);
+  const scene::ScanSurface scan = scan_of_panel(shaped, {}, {.spacing_m = 2e-3}, rng);
+  scene::Mesh cad = plain, sheet = plain;
+  for (std::size_t i = 0; i < cad.triangles.size(); ++i) {
+    if (plain.positions[plain.triangles[i][0]].x() < 0.05f) continue;
+    std::swap(cad.triangles[i][0], cad.triangles[i][1]);
+  }
+  for (std::size_t i = 0; i < cad.positions.size(); ++i)
+    if (cad.positions[i].x() > 0.05f) cad.normals[i] *= -1;
+  // The back of a sheet of 2 mm is not measured, and no reason to worry.
+  const auto first = static_cast<std::uint32_t>(plain.positions.size());
+  for (std::size_t i = 0; i < plain.positions.size(); ++i) {
+    sheet.positions.push_back(plain.positions[i] - 2e-3f * plain.normals[i]);
+    sheet.normals.push_back(-plain.normals[i]);
+  }
+  for (const auto& [a, b, c] : plain.triangles) sheet.triangles.push_back({first + b, first + a, first + c});
+  const auto found = deviation(cad, scan, Registration()), back = deviation(sheet, scan, Registration());
+  ASSERT_TRUE(found.ok() && back.ok());
+  EXPECT_NEAR(found->facing_away_m2, 0.1 * k_panel_height, 0.006);
+  expect_contains(deviation_warnings(*found, summary_of(*found), {}).at(0), "inside out");
+  EXPECT_LT(back->facing_away_m2, 1e-5);
+  EXPECT_TRUE(deviation_warnings(*back, summary_of(*back), {}).empty());
+}
+
+// Each triangle with corners of its own, as a CAD's edges and seams have them.
+scene::Mesh apart(const scene::Mesh& mesh) {
+  scene::Mesh out = mesh;
+  out.positions.clear();
+  out.normals.clear();
+  for (auto& triangle : out.triangles)
+    for (std::uint32_t& corner : triangle) {
+      out.positions.push_back(mesh.positions[corner]);
+      out.normals.push_back(mesh.normals[corner]);
+      corner = static_cast<std::uint32_t>(out.positions.size() - 1);
+    }
+  return out;
+}
+
+TEST(Deviation, ABumpIsOneExtremeWhereTheCadHasSeams) {
+  auto rng = test_rng();
+  const scene::Mesh cad = apart(panel_mesh(shaped, 40, 28));
+  const auto found =
+      deviation(cad, scan_of_panel(shaped, {{0, 0, 0.04, 3e-3}}, {.spacing_m = 2e-3}, rng), Registration());
+  ASSERT_TRUE(found.ok()) << found.message();
+  EXPECT_EQ(extremes(*found).size(), 1U);
+}
+
+// Points that are denser than the scan's say nothing of its noise to each other.
+TEST(Deviation, DensePointsDoNotHideTheNoise) {
+  auto rng = test_rng();
+  const scene::Mesh cad = panel_mesh(shaped, 50, 35);
+  const scene::ScanSurface scan = scan_of_panel(shaped, {}, {.spacing_m = 4e-3, .stated_stddev_m = 0}, rng);
+  double stddev_m[2] = {};
+  for (const bool is_dense : {false, true}) {
+    const auto found = deviation(cad, scan, Registration(), {.spacing_m = is_dense ? 1.6e-3 : 0});
+    ASSERT_TRUE(found.ok()) << found.message();
+    stddev_m[is_dense ? 1 : 0] = summary_of(*found).median_stddev_m;
+  }
+  EXPECT_NEAR(stddev_m[1] / stddev_m[0], 1, 0.25);
 }
 
 TEST(Deviation, SaysWhatItNeeds) {

@@ -1,5 +1,7 @@
 #include "wizard/measure/deviation_files.h"
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -26,6 +28,24 @@ Status check_deviation_options(const DeviationFilesOptions& options) {
   if (options.fit_box && !options.align.is_aligned)
     return usage_error("--fit: expected it without --no-align, which trusts the given pose.");
   return {};
+}
+
+// limn align states a metre along directions that the shape does not determine. With it every ripple of the
+// scan would be uncertain: a start is better. `radius_m` is that of the mesh.
+Matrix6d limited(const Matrix6d& covariance, double radius_m) {
+  Vector6d scale;
+  scale << Eigen::Vector3d::Constant(radius_m), Eigen::Vector3d::Ones();
+  const Matrix6d scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(scaled);
+  const Matrix6d axes = scale.cwiseInverse().asDiagonal() * solver.eigenvectors();
+  const Vector6d variances = solver.eigenvalues().cwiseMax(0).cwiseMin(k_free_stddev_m * k_free_stddev_m);
+  return axes * variances.asDiagonal() * axes.transpose();
+}
+
+double radius_of(const scene::Mesh& mesh) {
+  Eigen::AlignedBox3f box;
+  for (const Eigen::Vector3f& p : mesh.positions) box.extend(p);
+  return std::max(1e-3, static_cast<double>(box.diagonal().norm()) / 2);
 }
 
 // Fits again on the part of the scan inside the box, from where the whole scan lies.
@@ -70,6 +90,8 @@ Result<calib::DeviationReport> write_deviation(const DeviationFilesOptions& opti
   LIMN_TRY(ScanOnMesh found, aligned_scan(align));
   if (const Status same = calib::check_overlap(found.aligned.overlap); !same)
     return error("{}: {} Nothing was written.", found.file.string(), same.message());
+  // Before a local fit, on all of the scan.
+  measure_size(*found.mesh, *found.index, found.scan, &found.aligned);
   if (options.fit_box) LIMN_TRY_STATUS(fit_in_box(*options.fit_box, k_free_stddev_m, &found));
   found.index.reset();  // memory
 
@@ -78,6 +100,8 @@ Result<calib::DeviationReport> write_deviation(const DeviationFilesOptions& opti
   report.scan = found.file.string();
   report.made_at = time_now();
   report.registration = found.aligned.registration;
+  if (!options.align.is_aligned && !report.registration.free_directions.empty())
+    report.registration.covariance = limited(report.registration.covariance, radius_of(*found.mesh));
   report.start = found.aligned.how;
   report.fit_box = options.fit_box;
   const auto compared = calib::deviation(*found.mesh, found.scan, report.registration,
@@ -89,8 +113,7 @@ Result<calib::DeviationReport> write_deviation(const DeviationFilesOptions& opti
   report.deviation = *compared;
   report.summary = calib::summary_of(report.deviation);
   report.extremes = calib::extremes(report.deviation);
-  // The alignment's own sentences about free directions are replaced by those of the comparison.
-  if (report.registration.free_directions.empty()) report.warnings = found.aligned.warnings;
+  report.warnings = found.aligned.warnings;
   for (std::string& warning :
        calib::deviation_warnings(report.deviation, report.summary, report.registration))
     report.warnings.push_back(std::move(warning));

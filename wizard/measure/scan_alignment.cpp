@@ -40,6 +40,7 @@ struct Start {
   Pose world_from_prototype;
   std::optional<Matrix6d> covariance;  // if it comes from markers or from a file that states it
   std::string how;
+  std::vector<std::string> free_directions = {};  // if a file states them
 };
 
 // Six rows of six numbers.
@@ -61,6 +62,8 @@ Result<Start> start_from_file(const fs::path& path) {
   LIMN_TRY(const Config config, Config::load(path, ""));
   Start start{config.root().at("world_from_prototype").pose(), std::nullopt, "start"};
   if (const auto rows = config.root().find("covariance")) start.covariance = matrix_of(*rows);
+  if (const auto free = config.root().find("free_directions"))
+    for (const ConfigNode& direction : free->items()) start.free_directions.push_back(direction.text());
   LIMN_TRY_STATUS(config.status());
   return start;
 }
@@ -196,6 +199,7 @@ Result<MeshAligned> align(const AlignOptions& command,
   if (start && !command.is_aligned) {
     result.registration.world_from_prototype = start->world_from_prototype;
     if (start->covariance) result.registration.covariance = *start->covariance;
+    result.registration.free_directions = start->free_directions;
     result.how = "given";
   } else if (start) {
     LIMN_TRY(result.registration,
@@ -212,16 +216,21 @@ Result<MeshAligned> align(const AlignOptions& command,
           angle_between(found->rival->rotation, found->registration.world_from_prototype.rotation);
       result.warnings.push_back(fmt::format(
           "another pose, turned by {:.0f} degrees, fits {:.0f} % as many points: the shape is symmetric or "
-          "too little of it was scanned. Check residual.png, or give --start.",
+          "too little of it was scanned. Check the images, or give --start.",
           turn * 180 / M_PI, 100 * found->rival_share));
     }
   }
-  for (const std::string& free : result.registration.free_directions)
-    result.warnings.push_back(fmt::format(
+  return result;
+}
+
+std::vector<std::string> free_warnings(const calib::Registration& registration) {
+  std::vector<std::string> warnings;
+  for (const std::string& free : registration.free_directions)
+    warnings.push_back(fmt::format(
         "the scanned shape does not determine a {} (prototype's axes): that part of the pose comes from "
         "the start alone. Scan more of it, or use markers.",
         free));
-  return result;
+  return warnings;
 }
 
 std::string text_of(const calib::Difference& d) {
@@ -356,6 +365,14 @@ Result<ScanOnMesh> aligned_scan(const AlignOptions& command) {
   return found;
 }
 
+void measure_size(const scene::Mesh& mesh,
+                  const scene::MeshBvh& index,
+                  const scene::ScanSurface& scan,
+                  MeshAligned* aligned) {
+  if (const auto size = calib::scan_size(mesh, index, scan, aligned->registration)) aligned->size = *size;
+  if (calib::contradicts(aligned->size)) aligned->warnings.push_back(text_of(aligned->size));
+}
+
 Result<MeshAligned> align_scan(const AlignOptions& command) {
   const auto begun = std::chrono::steady_clock::now();
   LIMN_TRY_STATUS(check_options(command));
@@ -375,8 +392,9 @@ Result<MeshAligned> align_scan(const AlignOptions& command) {
   const fs::path& file = found.file;
   MeshAligned aligned = std::move(found.aligned);
   LIMN_TRY_STATUS(reported(command.report_stage, {.name = "compare"}));
-  if (const auto size = calib::scan_size(mesh, index, scan, aligned.registration)) aligned.size = *size;
-  if (calib::contradicts(aligned.size)) aligned.warnings.push_back(text_of(aligned.size));
+  for (std::string& warning : free_warnings(aligned.registration))
+    aligned.warnings.push_back(std::move(warning));
+  measure_size(mesh, index, scan, &aligned);
   const auto residuals = calib::residuals(index, scan, aligned.registration, k_residual_reach_m);
   const auto differences =
       calib::differences(scan, residuals, aligned.registration, {.least_m = 1e-3 * command.least_mm});

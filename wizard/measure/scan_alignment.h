@@ -51,12 +51,18 @@ struct ScanOnMesh {
   std::unique_ptr<const scene::MeshBvh> index;  ///< the mesh's
   scene::ScanSurface scan;
   std::filesystem::path file;  ///< the scan's PLY
-  MeshAligned aligned;         ///< without the scan's size
+  MeshAligned aligned;         ///< without the scan's size, and without warnings of free directions
 };
 
 /// The first part of align_scan(): reads both, aligns them and measures their overlap. It writes nothing and
 /// does not judge the overlap. Needs a scan.
 Result<ScanOnMesh> aligned_scan(const AlignOptions& options);
+
+/// Measures the scan's size against the mesh's, and adds a warning where they contradict each other.
+void measure_size(const scene::Mesh& mesh,
+                  const scene::MeshBvh& index,
+                  const scene::ScanSurface& scan,
+                  MeshAligned* aligned);
 
 /// Finds the pose of a CAD mesh in the scan and writes poses.json (which can be given as POSES.json),
 /// align.json with the covariance, residual.ply, residual.png and residual-side.png; warns where the CAD and
