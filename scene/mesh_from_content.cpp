@@ -316,7 +316,7 @@ class MeshMaker {
       mesh->triangle_materials[t] = static_cast<std::uint16_t>(content_.pieces[pieces[t]].material);
     mesh->materials = used_materials(content_, materials_);
     if (!mesh->uvs.empty()) return note_lacking();
-    if (!leave_out_maps(mesh) || std::exchange(is_without_uvs_told_, true)) return;
+    if (!leave_out_maps(mesh) || std::exchange(is_lack_reported_, true)) return;
     log_warning(
         "{}: expected texture coordinates because its materials have textures, found none. It is shown "
         "without textures. Export the mesh with texture coordinates.",
@@ -330,7 +330,7 @@ class MeshMaker {
       if (texture_uses(material).empty()) continue;
       for (const TexturePlace& place : texture_places(material)) {
         if (piece.find_uvs(place.coordinates)) continue;
-        if (!told_.emplace(piece.material, place.coordinates).second) continue;
+        if (!reported_.emplace(piece.material, place.coordinates).second) continue;
         log_warning(
             "{}: material {}: expected texture coordinates of set {} on all its triangles, because textures "
             "lie in them, found triangles without. These textures have one colour there. Export the mesh "
@@ -348,8 +348,8 @@ class MeshMaker {
   fs::path path_;
   double metres_;
   std::vector<Made> made_;                      // those that are no copies
-  std::set<std::pair<std::size_t, int>> told_;  // materials and the sets that pieces of theirs do not have
-  bool is_without_uvs_told_ = false;
+  std::set<std::pair<std::size_t, int>> reported_;  // materials and the sets that pieces of theirs do not have
+  bool is_lack_reported_ = false;
 };
 
 // Refuses a file whose variants together would not fit into memory.

@@ -217,7 +217,9 @@ const char* code_page(std::string_view text) {
 Status set_code_page(const fs::path& path, OcctDocument* out) {
   LIMN_TRY(const std::string content, read_file(path));
   const std::string page = is_utf8(content) ? "UTF8" : code_page(content);
-  Interface_Static::SetCVal("read.step.codepage", page.c_str());
+  // OpenCASCADE 7.6 has one name for both of China's code pages.
+  if (!Interface_Static::SetCVal("read.step.codepage", page.c_str()))
+    Interface_Static::SetCVal("read.step.codepage", "GB");
   if (page != "UTF8")
     out->warnings.push_back(fmt::format("names are not UTF-8, as STEP asks; they are taken as {}", page));
   return {};

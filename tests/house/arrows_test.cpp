@@ -90,7 +90,7 @@ const std::map<std::string, Names>& guests() {
       {"core/mrcal.h", {"core", "calib"}},
       {"ceres/", {"calib"}},
       {"assimp/", {"scene"}},
-      {"meshoptimizer", {"scene/files"}},
+      {"meshoptimizer", {"scene", "scene/files"}},
       {"draco/", {"scene/files"}},
       {"opencascade/", {"exchange/cad"}},  // a program of its own, in an optional package
       {"embree3/", {"sim"}},
