@@ -347,8 +347,9 @@ class MeshMaker {
   std::vector<Material> materials_;
   fs::path path_;
   double metres_;
-  std::vector<Made> made_;                      // those that are no copies
-  std::set<std::pair<std::size_t, int>> reported_;  // materials and the sets that pieces of theirs do not have
+  std::vector<Made> made_;  // those that are no copies
+  std::set<std::pair<std::size_t, int>>
+      reported_;  // materials and the sets that pieces of theirs do not have
   bool is_lack_reported_ = false;
 };
 
