@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -13,6 +11,7 @@
 #include "core/json_text.h"
 #include "core/user_folder.h"
 #include "core/utf8.h"
+#include "scene/files/glb_header.h"
 #include "scene/files/source_file.h"
 #include "scene/read_gltf.h"
 
@@ -25,24 +24,10 @@ using nlohmann::json;
 constexpr std::array<const char*, 4> k_cad_ends = {".step", ".stp", ".iges", ".igs"};
 constexpr std::array<const char*, 2> k_kept_ends = {".glb", ".failed"};
 
-// The JSON of a .glb without its buffers; null when it has none.
-json header_of(const fs::path& glb) {
-  std::ifstream in(glb, std::ios::binary);
-  std::array<std::uint32_t, 5> head{};  // magic, version, length; the first chunk's length and type
-  if (!in.read(reinterpret_cast<char*>(head.data()), sizeof(head))) return {};
-  std::error_code none;
-  const std::uintmax_t size = fs::file_size(glb, none);
-  // A file that was cut, as by a full disk or a copy that ended, is none.
-  if (std::memcmp(head.data(), "glTF", 4) != 0 || head[2] != size || head[3] > size) return {};
-  std::string text(head[3], ' ');
-  if (!in.read(text.data(), static_cast<std::streamsize>(text.size()))) return {};
-  return json::parse(text, nullptr, false);
-}
-
 // The GLB if it was made with these options from the CAD file as it is.
 std::optional<CadGlb> kept_glb(const fs::path& glb, const fs::path& file, const CadOptions& options) {
   try {
-    const json header = header_of(glb);
+    const json header = glb_header(glb);
     if (!header.is_object()) return std::nullopt;
     const json& made = header.at("asset").at("extras").at("limn_cad");
     if (made.value("format", 0) != k_cad_glb_format || made.at("chord_mm") != options.chord_mm ||

@@ -1,5 +1,7 @@
 #include "exchange/cad/cad_output.h"
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <cctype>
 #include <nlohmann/json.hpp>
@@ -7,7 +9,9 @@
 #include <span>
 
 #include "core/file.h"
+#include "core/utf8.h"
 #include "exchange/cad/cad_glb.h"
+#include "scene/files/glb_header.h"
 #include "scene/files/source_file.h"
 
 namespace limn::cad {
@@ -45,39 +49,74 @@ std::string file_name(const std::string& name) {
   return text.empty() ? "part" : text;
 }
 
+// The name of the CAD file that a GLB was made of; empty if it was not made of one.
+std::string made_of(const fs::path& glb) {
+  try {
+    return scene::glb_header(glb).at("asset").at("extras").at("limn_cad").at("sources").at(0).at("name");
+  } catch (const nlohmann::json::exception&) {
+    return "";
+  }
+}
+
+// The files of an earlier run on the same CAD file, without those in `now`.
+std::vector<std::string> earlier_files(const fs::path& folder,
+                                       const std::string& cad,
+                                       const std::set<std::string>& now) {
+  std::vector<std::string> files;
+  std::error_code none;
+  for (fs::directory_iterator at(folder, none), end; !none && at != end; at.increment(none)) {
+    const fs::path& path = at->path();
+    if (path.extension() == ".glb" && !now.contains(path.stem().string()) && made_of(path) == cad)
+      files.push_back(as_utf8(path.filename().string()));
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
 ordered_json list(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 }  // namespace
 
-Result<std::vector<WrittenPart>> write_parts(const CadModel& model,
-                                             TakenAs as,
-                                             const Tessellation& how,
-                                             const fs::path& out) {
+Result<WrittenParts> write_parts(const CadModel& model,
+                                 TakenAs as,
+                                 const Tessellation& how,
+                                 const fs::path& out) {
   const ordered_json extras = extras_of(model, how);
-  std::vector<WrittenPart> written;
+  WrittenParts written;
   if (as == TakenAs::part) {
     LIMN_TRY_STATUS(write_file(out, encode_cad_glb(model, model.nodes, extras)));
-    written.push_back({out.stem().string(), out});
+    written.parts.push_back({out.stem().string(), out});
     return written;
   }
-  LIMN_TRY_STATUS(make_folder(out));
+  const std::string& cad = model.sources.front().name;
   std::set<std::string> names;
   std::set<std::size_t> meshes;
-  for (const CadNode& node : model.nodes) {
-    if (!meshes.insert(node.mesh).second && as == TakenAs::variants) continue;
-    const std::string base = file_name(node.name);
-    std::string name = base;
-    for (int number = 2; !names.insert(name).second; ++number) name = fmt::format("{} {}", base, number);
-    const fs::path file = out / (name + ".glb");
-    LIMN_TRY_STATUS(write_file(file, encode_cad_glb(model, std::span(&node, 1), extras)));
-    written.push_back({name, file});
-  }
+  LIMN_TRY_STATUS(make_folder(out));
+  LIMN_TRY_STATUS(write_together(out, [&](const fs::path& into) -> Status {
+    for (const CadNode& node : model.nodes) {
+      if (!meshes.insert(node.mesh).second && as == TakenAs::variants) continue;
+      const std::string base = file_name(node.name);
+      std::string name = base;
+      for (int number = 2; !names.insert(name).second; ++number) name = fmt::format("{} {}", base, number);
+      const fs::path file = out / (name + ".glb");
+      if (std::error_code none; fs::exists(file, none) && made_of(file) != cad)
+        return error(
+            "{}: expected no file or one that was made of {}, found another file. Move it away, or choose "
+            "another folder.",
+            file.string(), cad);
+      LIMN_TRY_STATUS(write_file(into / file.filename(), encode_cad_glb(model, std::span(&node, 1), extras)));
+      written.parts.push_back({name, file});
+    }
+    return {};
+  }));
+  if (const auto files = earlier_files(out, cad, names); !files.empty())
+    written.warnings.push_back(
+        fmt::format("{} also has files of an earlier import of this file, which stay: {}", out.string(),
+                    fmt::join(files, ", ")));
   return written;
 }
 
-ordered_json cad_report(const CadModel& model,
-                        const Tessellation& how,
-                        const std::vector<WrittenPart>& written) {
+ordered_json cad_report(const CadModel& model, const Tessellation& how, const WrittenParts& written) {
   ordered_json json = {{"schema", "limn.cad/1"},
                        {"format", model.format},
                        {"application_protocol", model.schema},
@@ -106,9 +145,10 @@ ordered_json cad_report(const CadModel& model,
   json["triangles"] = model.triangle_count();
   json["chord_error_mm"] = chord_error_mm;
   json["files"] = ordered_json::array();
-  for (const WrittenPart& part : written)
+  for (const WrittenPart& part : written.parts)
     json["files"].push_back({{"name", part.name}, {"file", part.file.string()}});
   json["warnings"] = model.warnings;
+  for (const std::string& warning : written.warnings) json["warnings"].push_back(warning);
   return json;
 }
 

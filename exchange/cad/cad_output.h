@@ -25,16 +25,23 @@ struct WrittenPart {
   std::filesystem::path file;
 };
 
+struct WrittenParts {
+  std::vector<WrittenPart> parts;
+  std::vector<std::string> warnings;
+};
+
 /// Writes the model into the file `out` (as one part), or into files of the folder `out`, named after the
-/// solids. All files are in the frame of the CAD file, so that together they stand as in the assembly.
-Result<std::vector<WrittenPart>> write_parts(const CadModel& model,
-                                             TakenAs as,
-                                             const Tessellation& how,
-                                             const std::filesystem::path& out);
+/// solids, all of them or none. All files are in the frame of the CAD file, so that together they stand as in
+/// the assembly. Files that an earlier run made of a CAD file of the same name are replaced; those of them
+/// that no solid replaces stay, with a warning. Error: another file has the name of a solid.
+Result<WrittenParts> write_parts(const CadModel& model,
+                                 TakenAs as,
+                                 const Tessellation& how,
+                                 const std::filesystem::path& out);
 
 /// The report limn.cad/1 (docs/formats.md).
 nlohmann::ordered_json cad_report(const CadModel& model,
                                   const Tessellation& how,
-                                  const std::vector<WrittenPart>& written);
+                                  const WrittenParts& written);
 
 }  // namespace limn::cad

@@ -215,8 +215,8 @@ std::optional<Problem> run(const Options& options, int results) {
   const auto written = write_parts(*model, options.as, options.how, options.out);
   if (!written) return Problem{written.message(), k_not_done};
   const nlohmann::ordered_json report = cad_report(*model, options.how, *written);
-  for (const std::string& warning : model->warnings)
-    if (!options.json) std::cerr << "limn-cad: warning: " << warning << '\n';
+  for (const auto& warning : report["warnings"])
+    if (!options.json) std::cerr << "limn-cad: warning: " << warning.get<std::string>() << '\n';
   if (!write_all(results, options.json ? json_text(report) + "\n" : sentences_of(report)))
     return k_no_results;
   return std::nullopt;

@@ -417,6 +417,31 @@ TEST_F(Cad, FilesThatAFileRefersToAreReadBelowItsFolderAlone) {
             std::string::npos);
 }
 
+TEST_F(Cad, AnImportKeepsFilesThatItDidNotMake) {
+  StepText both, one;
+  both.part("bolt", {both.box({1, 1, 2})});
+  both.part("nut", {both.box({1, 1, 1})});
+  one.part("bolt", {one.box({1, 1, 3})});
+  exchange::CadImportOptions options{.file = write("all.step", both.file()), .out = folder / "slot"};
+  options.as = exchange::CadTakenAs::variants;
+  ASSERT_TRUE(exchange::import_cad(options));
+  write("all.step", one.file());
+  testing::internal::CaptureStderr();
+  ASSERT_TRUE(exchange::import_cad(options));
+  const std::string log = testing::internal::GetCapturedStderr();
+  EXPECT_NE(log.find("also has files of an earlier import of this file, which stay: nut.glb"),
+            std::string::npos)
+      << log;
+  EXPECT_FLOAT_EQ(box_of(load(folder / "slot/bolt.glb")).sizes().z(), 0.003F);
+  write("slot/bolt.glb", "somebody's own");
+  const Status refused = exchange::import_cad(options);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.message().find("slot/bolt.glb: expected no file or one that was made of all.step"),
+            std::string::npos)
+      << refused.message();
+  EXPECT_EQ(read_file(folder / "slot/bolt.glb").value(), "somebody's own");
+}
+
 TEST_F(Cad, NamesInOldCodePagesAreRead) {
   const auto name_of = [&](const std::string& bytes) {
     StepText step;
