@@ -21,8 +21,37 @@ constexpr double k_corners_per_square = 3;
 // Long, narrow triangles have many more corners than their area says; dividing ends at this many per `most`.
 constexpr std::size_t k_most_divided = 4;
 
+// Cosine of the angle from which on a corner's normal is one of shading, which rounds an edge that is sharp.
+constexpr float k_shading = 0.866F;  // 30 degrees
+
 double triangle_area(const Vector3f& a, const Vector3f& b, const Vector3f& c) {
   return (b - a).cast<double>().cross((c - a).cast<double>()).norm() / 2;
+}
+
+// Gives triangles corners of their own, with the triangle's normal, where the mesh's normal is one of
+// shading: along it the distance to a face would be too large. Normals on the other side stay: there the
+// triangle is inside out.
+void split_shaded_corners(scene::ScanSurface* surface) {
+  for (Corners& triangle : surface->triangles) {
+    const Vector3f a = surface->positions[triangle[0]];
+    const Vector3f n =
+        (surface->positions[triangle[1]] - a).cross(surface->positions[triangle[2]] - a).normalized();
+    for (std::uint32_t& corner : triangle) {
+      const float cosine = surface->normals[corner].dot(n);
+      if (!(cosine > 0 && cosine < k_shading)) continue;
+      const Vector3f p = surface->positions[corner];
+      corner = static_cast<std::uint32_t>(surface->positions.size());
+      surface->positions.push_back(p);
+      surface->normals.push_back(n);
+    }
+  }
+}
+
+scene::ScanSurface with_points_of_triangles(const scene::ScanSurface& surface) {
+  std::vector<bool> is_used(surface.positions.size(), false);
+  for (const Corners& triangle : surface.triangles)
+    for (const std::uint32_t corner : triangle) is_used[corner] = true;
+  return scene::with_vertices_kept(surface, is_used);
 }
 
 // The middles of edges that were divided, by the edge's corners.
@@ -208,7 +237,10 @@ SurfaceSamples surface_samples(const scene::Mesh& mesh, double spacing_m, std::s
   for (const auto& [i, j, k] : mesh.triangles)
     if (triangle_area(mesh.positions[i], mesh.positions[j], mesh.positions[k]) > k_least_area_m2)
       out.surface.triangles.push_back({i, j, k});
-  divide_all(out.spacing_m, std::max(k_most_divided * most, mesh.positions.size() + most), &out.surface);
+  split_shaded_corners(&out.surface);
+  out.surface = with_points_of_triangles(out.surface);
+  divide_all(out.spacing_m, std::max(k_most_divided * most, out.surface.positions.size() + most),
+             &out.surface);
   out.areas_m2 = areas_at_points(out.surface);
   if (out.surface.positions.size() > most) return merged_samples(out, most);
   return out;

@@ -312,6 +312,24 @@ TEST(SurfaceSamples, CoverTheMeshAndDependOnItsAreaOnly) {
 }
 
 // Triangles that meet at an edge are divided at the same points of it.
+// A box whose normals are those of its corners, as programs export it for smooth shading.
+TEST(SurfaceSamples, FaceAsTheFacesDoWhereTheMeshIsShadedSmoothly) {
+  scene::Mesh box;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3f p(corner & 1 ? 0.1F : -0.1F, corner & 2 ? 0.1F : -0.1F, corner & 4 ? 0.1F : -0.1F);
+    box.positions.push_back(p);
+    box.normals.push_back(p.normalized());
+  }
+  box.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                   {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  const SurfaceSamples samples = surface_samples(box, 0.02, 100'000);
+  for (std::size_t i = 0; i < samples.surface.positions.size(); ++i) {
+    EXPECT_GT(samples.surface.normals[i].cwiseAbs().maxCoeff(), 0.999F);
+    EXPECT_GT(samples.surface.normals[i].dot(samples.surface.positions[i]), 0.0999F);
+  }
+  EXPECT_GT(samples.surface.positions.size(), 600U);
+}
+
 TEST(SurfaceSamples, HaveNoCracks) {
   const SurfaceSamples samples = surface_samples(panel_mesh(flat, 3, 2), 7e-3, 100'000);
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
