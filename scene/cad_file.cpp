@@ -27,7 +27,7 @@ constexpr std::array<const char*, 2> k_kept_ends = {".glb", ".failed"};
 // The GLB if it was made with these options from the CAD file as it is.
 std::optional<CadGlb> kept_glb(const fs::path& glb, const fs::path& file, const CadOptions& options) {
   try {
-    const json header = glb_header(glb);
+    const json header = json::parse(glb_header(glb), nullptr, false);
     if (!header.is_object()) return std::nullopt;
     const json& made = header.at("asset").at("extras").at("limn_cad");
     if (made.value("format", 0) != k_cad_glb_format || made.at("chord_mm") != options.chord_mm ||

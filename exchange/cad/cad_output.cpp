@@ -52,7 +52,13 @@ std::string file_name(const std::string& name) {
 // The name of the CAD file that a GLB was made of; empty if it was not made of one.
 std::string made_of(const fs::path& glb) {
   try {
-    return scene::glb_header(glb).at("asset").at("extras").at("limn_cad").at("sources").at(0).at("name");
+    return ordered_json::parse(scene::glb_header(glb))
+        .at("asset")
+        .at("extras")
+        .at("limn_cad")
+        .at("sources")
+        .at(0)
+        .at("name");
   } catch (const nlohmann::json::exception&) {
     return "";
   }
