@@ -1,11 +1,15 @@
 """A headless Chromium, driven through Debian's chromedriver (W3C WebDriver) with Python's standard library alone."""
 
 import base64
+import contextlib
+import functools
+import http.server
 import json
 import os
 import shutil
 import subprocess
 import tempfile
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -149,3 +153,19 @@ class Browser:
     def screenshot(self, path):
         with open(path, "wb") as file:
             file.write(base64.b64decode(self._call("GET", self.session + "/screenshot")))
+
+
+class Silent(http.server.SimpleHTTPRequestHandler):
+    def log_message(self, *_):
+        pass
+
+
+def answer_on_page(folder, page, script, *arguments):
+    """What a script answers in a browser with WebGL, on a page of a folder of files."""
+    handler = functools.partial(Silent, directory=folder)
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    options = ("--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader")
+    with contextlib.closing(Driver()) as driver, contextlib.closing(Browser(driver, arguments=options)) as browser:
+        browser.open(f"http://127.0.0.1:{server.server_address[1]}/{page}")
+        return browser.script_async(script, *arguments)

@@ -3,13 +3,9 @@
     glasses_camera_test.py PAGE_FOLDER
 """
 
-import contextlib
-import functools
-import http.server
 import sys
-import threading
 
-from browser import Browser, Driver
+from browser import answer_on_page
 
 WIDTH, HEIGHT, FOCAL_PX = 1280, 720, 900
 
@@ -52,11 +48,6 @@ return {
 """
 
 
-class Silent(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        pass
-
-
 def problems_of(taken):
     """What is not as the message glasses_view and its picture must be, in words."""
     message, scale = taken["message"], 960 / WIDTH
@@ -79,13 +70,7 @@ def problems_of(taken):
 
 
 def main():
-    handler = functools.partial(Silent, directory=sys.argv[1])
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    arguments = ("--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader")
-    with contextlib.closing(Driver()) as driver, contextlib.closing(Browser(driver, arguments=arguments)) as browser:
-        browser.open(f"http://127.0.0.1:{server.server_address[1]}/glasses_camera.js")
-        problems = problems_of(browser.script_async(TAKE, WIDTH, HEIGHT, FOCAL_PX))
+    problems = problems_of(answer_on_page(sys.argv[1], "glasses_camera.js", TAKE, WIDTH, HEIGHT, FOCAL_PX))
     print("\n".join(problems) or "passed")
     return 1 if problems else 0
 

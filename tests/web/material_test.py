@@ -3,13 +3,9 @@
     material_test.py PAGE_FOLDER
 """
 
-import contextlib
-import functools
-import http.server
 import sys
-import threading
 
-from browser import Browser, Driver
+from browser import answer_on_page
 
 # A square of two pieces (left and right) that share their materials' images. Its first texture coordinates run from left to
 # right, and its second ones from right to left.
@@ -169,19 +165,8 @@ def problems_of(found):
     return out
 
 
-class Silent(http.server.SimpleHTTPRequestHandler):
-    def log_message(self, *_):
-        pass
-
-
 def main():
-    handler = functools.partial(Silent, directory=sys.argv[1])
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    arguments = ("--enable-unsafe-swiftshader", "--use-gl=angle", "--use-angle=swiftshader")
-    with contextlib.closing(Driver()) as driver, contextlib.closing(Browser(driver, arguments=arguments)) as browser:
-        browser.open(f"http://127.0.0.1:{server.server_address[1]}/glb.js")
-        problems = problems_of(browser.script_async(FACTS))
+    problems = problems_of(answer_on_page(sys.argv[1], "glb.js", FACTS))
     print("\n".join(problems) or "passed")
     return 1 if problems else 0
 
