@@ -215,6 +215,15 @@ ConnectedComponents connected_components(const ScanSurface& surface) {
   return pieces;
 }
 
+Mesh mesh_of(const ScanSurface& surface) {
+  Mesh mesh;
+  mesh.positions = surface.positions;
+  mesh.normals = surface.normals;
+  mesh.triangles = surface.triangles;
+  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
+  return mesh;
+}
+
 ScanSurface with_vertices_kept(const ScanSurface& surface, const std::vector<bool>& keep) {
   ScanSurface out;
   std::vector<std::uint32_t> number(surface.positions.size(), 0);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "scene/mesh.h"
 
 namespace limn::scene {
 
@@ -36,6 +37,9 @@ struct ConnectedComponents {
   std::vector<double> areas;   ///< Area of each piece, m².
 };
 ConnectedComponents connected_components(const ScanSurface& surface);
+
+/// The surface's triangles as a mesh with one material, for what takes meshes, such as MeshBvh.
+Mesh mesh_of(const ScanSurface& surface);
 
 /// The vertices with `keep` set and the triangles between them.
 ScanSurface with_vertices_kept(const ScanSurface& surface, const std::vector<bool>& keep);

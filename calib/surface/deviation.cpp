@@ -27,15 +27,6 @@ constexpr double k_beside_m = 10e-6;       // distance of the normal's line from
 constexpr double k_sure_stddevs = 2;       // standard deviations that must fit into the tolerance
 constexpr float k_none = std::numeric_limits<float>::quiet_NaN();
 
-scene::Mesh target_mesh(const scene::ScanSurface& surface) {
-  scene::Mesh mesh;
-  mesh.positions = surface.positions;
-  mesh.normals = surface.normals;
-  mesh.triangles = surface.triangles;
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  return mesh;
-}
-
 using ScanEdge = std::uint64_t;
 ScanEdge scan_edge(std::uint32_t a, std::uint32_t b) {
   return (static_cast<ScanEdge>(std::min(a, b)) << 32) | std::max(a, b);
@@ -82,7 +73,7 @@ class ScanTarget {
  public:
   explicit ScanTarget(const scene::ScanSurface& scan)
       : scan_(scan),
-        mesh_(target_mesh(scan)),
+        mesh_(scene::mesh_of(scan)),
         index_(mesh_),
         at_edge_(vertices_at_edges(scan)),
         states_noise_(states_noise(scan)) {}

@@ -165,15 +165,6 @@ constexpr double k_same_m = 2e-3;  // distance of two poses' surfaces where they
 constexpr double k_laid_share = 0.7;
 constexpr double k_least_share = 0.3;  // with less it is not certain that both are the same object
 
-scene::Mesh mesh_of(const scene::ScanSurface& surface) {
-  scene::Mesh mesh;
-  mesh.positions = surface.positions;
-  mesh.normals = surface.normals;
-  mesh.triangles = surface.triangles;
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  return mesh;
-}
-
 // Joins the views `from` to `to` to one surface.
 scene::ScanSurface joint_surface(const std::vector<ScanView>& views, size_t from, size_t to) {
   scene::ScanSurface all;
@@ -219,7 +210,7 @@ Status lay_onto_first(Scan* scan) {
   if (first.triangles.empty())
     return error("{}: no surface was measured in this pose, so the other poses cannot be registered to it.",
                  scan->views[0].pose);
-  const scene::Mesh mesh = mesh_of(first);
+  const scene::Mesh mesh = scene::mesh_of(first);
   const scene::MeshBvh index(mesh);
   for (size_t begin = first_end; begin < scan->views.size(); begin = same_pose(begin)) {
     const scene::ScanSurface surface = joint_surface(scan->views, begin, same_pose(begin));

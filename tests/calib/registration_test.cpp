@@ -225,17 +225,8 @@ scene::ScanSurface plate(double bump) {
   return surface;
 }
 
-scene::Mesh mesh_of(const scene::ScanSurface& surface) {
-  scene::Mesh mesh;
-  mesh.positions = surface.positions;
-  mesh.normals = surface.normals;
-  mesh.triangles = surface.triangles;
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  return mesh;
-}
-
 TEST(Align, NamesWhatAFlatShapeDoesNotHold) {
-  const scene::Mesh mesh = mesh_of(plate(0));
+  const scene::Mesh mesh = scene::mesh_of(plate(0));
   const scene::MeshBvh index(mesh);
   const Pose start(exp_rotation({0.02, -0.01, 0}), {0, 0, 0.004});
   const auto found = refined_registration(mesh, index, plate(0), start);
@@ -252,7 +243,7 @@ TEST(Align, NamesWhatAFlatShapeDoesNotHold) {
 }
 
 TEST(Align, TellsWhereAndHowFarTheScanDiffers) {
-  const scene::Mesh mesh = mesh_of(plate(0));
+  const scene::Mesh mesh = scene::mesh_of(plate(0));
   const scene::MeshBvh index(mesh);
   const scene::ScanSurface scan = plate(-2.5e-3);
   Registration home;
@@ -285,13 +276,13 @@ TEST(Align, PicksGiveThePoseOrSayWhichOneIsWrong) {
 }
 
 TEST(Align, SaysThatTheUnitsAreWrong) {
-  scene::Mesh mesh = mesh_of(plate(0));
+  scene::Mesh mesh = scene::mesh_of(plate(0));
   for (auto& p : mesh.positions) p *= 1000;
   const Status sizes = comparable_sizes(mesh, plate(0));
   ASSERT_FALSE(sizes.ok());
   EXPECT_NE(sizes.message().find("1000 times larger"), std::string::npos) << sizes.message();
   EXPECT_NE(sizes.message().find("--units"), std::string::npos);
-  EXPECT_TRUE(comparable_sizes(mesh_of(plate(0)), plate(0)).ok());
+  EXPECT_TRUE(comparable_sizes(scene::mesh_of(plate(0)), plate(0)).ok());
 }
 
 }  // namespace
