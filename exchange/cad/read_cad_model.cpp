@@ -6,6 +6,7 @@
 #include <opencascade/BRepBuilderAPI_Sewing.hxx>
 #include <opencascade/BRep_Builder.hxx>
 #include <opencascade/TopExp_Explorer.hxx>
+#include <opencascade/TopTools_MapOfShape.hxx>
 #include <opencascade/TopoDS.hxx>
 #include <opencascade/TopoDS_Compound.hxx>
 #include <opencascade/TopoDS_Iterator.hxx>
@@ -36,13 +37,18 @@ Eigen::Matrix4d matrix_of(const gp_Trsf& placed) {
   return m;
 }
 
+XCAFPrs_IndexedDataMapOfShapeStyle styles_inside(const Leaf& leaf) {
+  XCAFPrs_IndexedDataMapOfShapeStyle styles;
+  XCAFPrs::CollectStyleSettings(leaf.product, TopLoc_Location(), styles);
+  return styles;
+}
+
 // The colours of a product's faces.
 class FaceColours {
  public:
   explicit FaceColours(const Leaf& leaf) : leaf_(leaf) {
     if (leaf.whole) return;
-    XCAFPrs_IndexedDataMapOfShapeStyle styles;
-    XCAFPrs::CollectStyleSettings(leaf.product, TopLoc_Location(), styles);
+    const XCAFPrs_IndexedDataMapOfShapeStyle styles = styles_inside(leaf);
     for (int type = TopAbs_FACE; type >= TopAbs_COMPOUND; --type)  // a face's own colour comes first
       for (XCAFPrs_IndexedDataMapOfShapeStyle::Iterator at(styles); at.More(); at.Next())
         if (at.Key().ShapeType() == type && at.Value().IsSetColorSurf()) bind(at.Key(), at.Value());
@@ -69,41 +75,62 @@ struct Body {
   std::string name;
 };
 
-// The bodies inside a shape; faces that belong to none of them go to `rest`.
-void add_bodies(const TopoDS_Shape& shape,
-                const ShapeNames& names,
-                std::vector<Body>* bodies,
-                TopoDS_Compound* rest) {
-  const std::string* name = names.Seek(shape.Located(TopLoc_Location()));
-  const bool is_solid = shape.ShapeType() == TopAbs_SOLID;
-  const bool is_surface = shape.ShapeType() < TopAbs_FACE && name &&
-                          !TopExp_Explorer(shape, TopAbs_SOLID).More() &&
-                          TopExp_Explorer(shape, TopAbs_FACE).More();
-  if (is_solid || is_surface)
-    bodies->push_back({shape, name ? *name : ""});
-  else if (shape.ShapeType() == TopAbs_FACE)
-    BRep_Builder().Add(*rest, shape);
-  else if (shape.ShapeType() < TopAbs_FACE)
-    for (TopoDS_Iterator at(shape); at.More(); at.Next()) add_bodies(at.Value(), names, bodies, rest);
+// The shapes inside a product that the file hides.
+TopTools_MapOfShape hidden_inside(const Leaf& leaf) {
+  TopTools_MapOfShape hidden;
+  const XCAFPrs_IndexedDataMapOfShapeStyle styles = styles_inside(leaf);
+  for (XCAFPrs_IndexedDataMapOfShapeStyle::Iterator at(styles); at.More(); at.Next())
+    if (!at.Value().IsVisible()) hidden.Add(at.Key());
+  return hidden;
 }
 
-std::vector<Body> bodies_of(const Leaf& leaf, const ShapeNames& names) {
-  const TopoDS_Shape product = XCAFDoc_ShapeTool::GetShape(leaf.product);
-  std::vector<Body> bodies;
-  if (product.IsNull()) return bodies;
-  TopoDS_Compound rest;
-  BRep_Builder().MakeCompound(rest);
-  add_bodies(product, names, &bodies, &rest);
-  if (TopoDS_Iterator(rest).More()) bodies.push_back({rest, ""});
-  // The product's name is what people know; the names of its solids matter where there are several.
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    if (bodies.size() == 1 && !leaf.name.empty())
-      bodies[i].name = leaf.name;
-    else if (bodies[i].name.empty())
-      bodies[i].name = leaf.name.empty() ? leaf.name : fmt::format("{} {}", leaf.name, i + 1);
+// The bodies of a product.
+class Bodies {
+ public:
+  Bodies(const Leaf& leaf, const ShapeNames& names) : names_(names), hidden_(hidden_inside(leaf)) {
+    const TopoDS_Shape product = XCAFDoc_ShapeTool::GetShape(leaf.product);
+    if (product.IsNull()) return;
+    BRep_Builder().MakeCompound(rest_);
+    add(product);
+    if (TopoDS_Iterator(rest_).More()) all_.push_back({rest_, ""});
+    // The product's name is what people know; the names of its solids matter where there are several.
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      if (all_.size() == 1 && !leaf.name.empty())
+        all_[i].name = leaf.name;
+      else if (all_[i].name.empty())
+        all_[i].name = leaf.name.empty() ? leaf.name : fmt::format("{} {}", leaf.name, i + 1);
+    }
   }
-  return bodies;
-}
+
+  const std::vector<Body>& all() const { return all_; }
+  int hidden() const { return left_out_; }  // the number of those that the file hides: not in all()
+
+ private:
+  // A hidden face of a body that is shown stays: the body would not close without it.
+  void add(const TopoDS_Shape& shape) {
+    if (hidden_.Contains(shape)) {
+      ++left_out_;
+      return;
+    }
+    const std::string* name = names_.Seek(shape.Located(TopLoc_Location()));
+    const bool is_solid = shape.ShapeType() == TopAbs_SOLID;
+    const bool is_surface = shape.ShapeType() < TopAbs_FACE && name &&
+                            !TopExp_Explorer(shape, TopAbs_SOLID).More() &&
+                            TopExp_Explorer(shape, TopAbs_FACE).More();
+    if (is_solid || is_surface)
+      all_.push_back({shape, name ? *name : ""});
+    else if (shape.ShapeType() == TopAbs_FACE)
+      BRep_Builder().Add(rest_, shape);  // belongs to no body
+    else if (shape.ShapeType() < TopAbs_FACE)
+      for (TopoDS_Iterator at(shape); at.More(); at.Next()) add(at.Value());
+  }
+
+  const ShapeNames& names_;
+  TopTools_MapOfShape hidden_;
+  TopoDS_Compound rest_;
+  std::vector<Body> all_;
+  int left_out_ = 0;
+};
 
 using ShapeColours = NCollection_DataMap<TopoDS_Shape, Colour, TopTools_ShapeMapHasher>;
 
@@ -201,6 +228,9 @@ class Builder {
     if (const auto mesh = cut_body({whole.shape, name}, whole)) add_node(name, {}, *mesh, gp_Trsf());
   }
 
+  // The number of bodies inside the products that the file hides.
+  int hidden() const { return hidden_; }
+
   // The model; the builder is empty then.
   CadModel take_model() {
     if (open_ > k_most_open)
@@ -230,7 +260,9 @@ class Builder {
     const bool has_solid = TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
     if (document_.format == "IGES" && !has_solid) return cut_group(leaf);
     const FaceColours colours(leaf);
-    for (const Body& body : bodies_of(leaf, document_.shape_names))
+    const Bodies bodies(leaf, document_.shape_names);
+    hidden_ += bodies.hidden();
+    for (const Body& body : bodies.all())
       if (const auto mesh = cut_body(body, [&](const TopoDS_Face& face) { return colours(face); }))
         named.emplace_back(body.name, *mesh);
     return named;
@@ -269,7 +301,7 @@ class Builder {
   const Tessellation& how_;
   std::map<std::string, Named> meshes_of_;
   std::size_t triangles_ = 0;
-  int open_ = 0;
+  int open_ = 0, hidden_ = 0;
   CadModel model_;
 };
 
@@ -293,8 +325,9 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
   }
   CadModel model = builder.take_model();
   model.warnings.insert(model.warnings.begin(), document.warnings.begin(), document.warnings.end());
-  if (leaves.hidden > 0)
-    model.warnings.push_back(fmt::format("{} hidden shapes are left out", leaves.hidden));
+  if (const int hidden = leaves.hidden + builder.hidden(); hidden > 0)
+    model.warnings.push_back(
+        fmt::format("{} hidden {} left out", hidden, hidden == 1 ? "shape is" : "shapes are"));
   if (model.nodes.empty())
     return error(
         "{}: expected {} with surfaces, found only {}. Export solids or surfaces by their boundaries.",

@@ -320,6 +320,31 @@ TEST_F(Cad, ShapesThatAreNotReadAreNamed) {
   EXPECT_EQ(found["warnings"], json({"CSG solids are left out"}));
 }
 
+TEST_F(Cad, HiddenShapesAreLeftOut) {
+  StepText step;
+  const int shown = step.box({10, 10, 10}, nullptr, "shown"),
+            hidden = step.box({90, 90, 90}, nullptr, "inner");
+  step.hide(hidden);
+  step.part("both", {shown, hidden});
+  const json found = report(write("both.step", step.file()));
+  ASSERT_EQ(found["solids"].size(), 1u) << found;
+  EXPECT_TRUE(test::near(box_of(found["solids"][0]).max(), Vector3d::Constant(0.01), 1e-6)) << found;
+  EXPECT_EQ(found["warnings"], json({"1 hidden shape is left out"}));
+
+  StepText face;
+  std::vector<int> faces;
+  face.part("box", {face.box({10, 10, 10}, &faces)});
+  face.hide(faces[0]);
+  const json box = report(write("box.step", face.file()));
+  EXPECT_TRUE(box["solids"][0]["closed"].get<bool>()) << box;
+
+  StepText nothing;
+  const int all = nothing.box({10, 10, 10});
+  nothing.part("nothing", {all});
+  nothing.hide(all);
+  EXPECT_NE(refusal(write("nothing.step", nothing.file())).find("hidden shapes"), std::string::npos);
+}
+
 TEST_F(Cad, NamedSurfacesOfAProductAreApart) {
   StepText step;
   std::vector<int> models;

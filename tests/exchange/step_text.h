@@ -108,8 +108,8 @@ class StepText {
     add("DOCUMENT_REPRESENTATION_TYPE('digital',#{})", document);
   }
 
-  /// The colour of a solid or a face, in sRGB.
-  void paint(int item, const Point& srgb) {
+  /// Gives a solid or a face a colour, in sRGB; returns the number of the styled item.
+  int paint(int item, const Point& srgb) {
     const int colour = add("COLOUR_RGB('',{:.6f},{:.6f},{:.6f})", srgb[0], srgb[1], srgb[2]);
     const int fill = add("FILL_AREA_STYLE_COLOUR('',#{})", colour);
     const int area = add("FILL_AREA_STYLE('',(#{}))", fill);
@@ -117,9 +117,11 @@ class StepText {
     const int side = add("SURFACE_SIDE_STYLE('',(#{}))", surface);
     const int use = add("SURFACE_STYLE_USAGE(.BOTH.,#{})", side);
     const int style = add("PRESENTATION_STYLE_ASSIGNMENT((#{}))", use);
-    styles_ +=
-        fmt::format("{}#{}", styles_.empty() ? "" : ",", add("STYLED_ITEM('',(#{}),#{})", style, item));
+    const int styled = add("STYLED_ITEM('',(#{}),#{})", style, item);
+    styles_ += fmt::format("{}#{}", styles_.empty() ? "" : ",", styled);
+    return styled;
   }
+  void hide(int item) { add("INVISIBILITY((#{}))", paint(item, {1, 1, 1})); }
 
   std::string file() {
     if (!styles_.empty())
