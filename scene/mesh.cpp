@@ -23,13 +23,18 @@ Result<MeshContent> read_safely(const fs::path& path) {
 
 Result<MeshContent> load_content(const fs::path& path, const std::stop_token& stop) {
   if (!is_mesh_name(path)) return read_mesh_content(path).error();
-  if (std::error_code code; !fs::is_regular_file(path, code)) {
+  std::error_code none;
+  if (!fs::is_regular_file(path, none))
     return error("{}: expected a mesh file, found no file. Check the name.", path.string());
-  }
   if (is_cad_name(path)) {
-    LIMN_TRY(const CadGlb glb, cad_as_glb(path, {}, stop));
-    LIMN_TRY(MeshContent triangles, read_safely(glb.path));
-    return with_cad_unit(std::move(triangles), glb);
+    LIMN_TRY(CadGlb glb, cad_as_glb(path, {}, stop));
+    auto triangles = read_safely(glb.path);
+    if (!triangles) {  // what was kept has been damaged since
+      fs::remove(glb.path, none);
+      LIMN_TRY(glb, cad_as_glb(path, {}, stop));
+      LIMN_TRY(triangles, read_safely(glb.path));
+    }
+    return with_cad_unit(std::move(*triangles), glb);
   }
   return read_safely(path);
 }

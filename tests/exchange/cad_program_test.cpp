@@ -65,13 +65,20 @@ TEST_F(Cad, WhatWasKeptIsMadeAgainWhenTheFileChanges) {
   EXPECT_NE(fs::last_write_time(kept), first);
 }
 
-TEST_F(Cad, AKeptGlbThatWasCutOrIsOfAnotherVersionIsMadeAgain) {
+TEST_F(Cad, AKeptGlbThatIsDamagedOrOfAnotherVersionIsMadeAgain) {
   const fs::path file = write("box.step", box_file("mm", "AUTOMOTIVE_DESIGN")),
                  kept = folder / ".box.step.glb";
   load(file);
   const std::string whole = read_file(kept).value();
   ASSERT_TRUE(write_file(kept, whole.substr(0, whole.size() - 40)));
   EXPECT_EQ(load(file).triangles.size(), 12u);
+  EXPECT_EQ(read_file(kept).value(), whole);
+  std::string damaged = whole;  // of the right length, but no views of its buffer
+  const std::size_t views = damaged.find("\"bufferViews\"");
+  ASSERT_NE(views, std::string::npos);
+  damaged.replace(views, 13, "\"bufferVoids\"");
+  ASSERT_TRUE(write_file(kept, damaged));
+  load(file);
   EXPECT_EQ(read_file(kept).value(), whole);
   std::string old = whole;
   const std::size_t at = old.find("\"format\":");
