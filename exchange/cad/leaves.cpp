@@ -13,6 +13,7 @@
 namespace limn::cad {
 namespace {
 
+constexpr std::size_t k_most_leaves = 200000;
 constexpr float k_no_colour = 0.6F;  // as meshes that state none
 
 std::string name_of(const TDF_Label& label) {
@@ -48,7 +49,7 @@ Colour colour_of(const XCAFPrs_Style& style) {
           stated.Alpha()};
 }
 
-Leaves leaves_of(const Handle(TDocStd_Document) & document) {
+Result<Leaves> leaves_of(const Handle(TDocStd_Document) & document, const std::filesystem::path& path) {
   Leaves leaves;
   const Handle(XCAFDoc_ColorTool) colours = XCAFDoc_DocumentTool::ColorTool(document->Main());
   for (XCAFPrs_DocumentExplorer at(document, XCAFPrs_DocumentExplorerFlags_OnlyLeafNodes); at.More();
@@ -76,6 +77,13 @@ Leaves leaves_of(const Handle(TDocStd_Document) & document) {
     const Colour colour = leaf.whole ? *leaf.whole : colour_of(leaf.style);
     leaf.key += fmt::format("{}{}", leaf.whole.has_value(), fmt::join(colour, " "));
     leaves.all.push_back(std::move(leaf));
+    if (leaves.all.size() > k_most_leaves)
+      return error(
+          "{}: expected at most {} placed parts, found more in assemblies within assemblies. Export a part "
+          "of "
+          "the "
+          "assembly.",
+          path.string(), k_most_leaves);
   }
   return leaves;
 }

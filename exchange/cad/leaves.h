@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <opencascade/TDF_Label.hxx>
 #include <opencascade/TDocStd_Document.hxx>
 #include <opencascade/XCAFPrs_Style.hxx>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "exchange/cad/cad_model.h"
 
 namespace limn::cad {
@@ -28,7 +30,8 @@ struct Leaves {
   std::vector<Leaf> all;
   int hidden = 0;  ///< Those that the file hides are left out.
 };
-Leaves leaves_of(const Handle(TDocStd_Document) & document);
+/// Error: they are too many; `path` is the file, for the message.
+Result<Leaves> leaves_of(const Handle(TDocStd_Document) & document, const std::filesystem::path& path);
 
 /// The linear colour of a style; grey where it has none.
 Colour colour_of(const XCAFPrs_Style& style);

@@ -310,7 +310,7 @@ class Builder {
 Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, ProgressLines* progress) {
   LIMN_TRY(const OcctDocument document, read_document(path, progress));
   progress->begin_stage("cutting into triangles", k_translated_percent, k_cut_percent);
-  Leaves leaves = leaves_of(document.document);
+  LIMN_TRY(Leaves leaves, leaves_of(document.document, path));
   Builder builder(path, document, how);
   if (document.format == "IGES") {
     const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), is_whole);

@@ -219,7 +219,7 @@ Result<exchange::CurveList> read_curves(const fs::path& path,
   LIMN_TRY(const OcctDocument document, read_document(path, progress));
   progress->begin_stage("following curves", k_read_percent, 100);
   Curves curves(how);
-  const Leaves leaves = leaves_of(document.document);
+  LIMN_TRY(const Leaves leaves, leaves_of(document.document, path));
   for (std::size_t i = 0; i < leaves.all.size(); ++i) {
     const Leaf& leaf = leaves.all[i];
     const TopoDS_Shape shape = XCAFDoc_ShapeTool::GetShape(leaf.product);

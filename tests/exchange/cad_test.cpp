@@ -294,6 +294,19 @@ TEST_F(Cad, AnAssemblyThatContainsItselfIsRefused) {
   EXPECT_NE(text.find("outer -> inner -> outer"), std::string::npos) << text;
 }
 
+TEST_F(Cad, AssembliesWithinAssembliesHaveABound) {
+  StepText step;
+  auto inner = step.part("bolt", {step.box({1, 1, 1})});
+  for (int level = 0; level < 6; ++level) {
+    const auto outer = step.assembly("level " + std::to_string(level));
+    for (int i = 0; i < 8; ++i) step.place(outer, inner, {2.0 * i, 0, 0}, std::to_string(i));
+    inner = outer;
+  }
+  const std::string text = refusal(write("nested.step", step.file()));
+  EXPECT_NE(text.find("nested.step: expected at most 200000 placed parts, found more"), std::string::npos)
+      << text;
+}
+
 TEST_F(Cad, WhatIsNotWholeIsShownWithAWarning) {
   StepText open, unitless("none");
   open.part("lid", {open.box({10, 10, 10}, nullptr, "", true)});
