@@ -10,7 +10,9 @@ namespace limn::cad {
 
 /// How surfaces become triangles.
 struct Tessellation {
-  double chord_mm = 0.1;  ///< The largest distance between a surface and its triangles.
+  /// The largest distance between a surface and its triangles. Up to 0.1 mm, small models are cut more
+  /// finely: to 1/5000 of their diagonal, if that gives few enough triangles.
+  double chord_mm = 0.1;
   double angle_deg = 20;  ///< The largest angle between the normals at the ends of a triangle's side.
   double solid_seconds =
       4;  ///< Processor time for a solid, and 20 ms a face; then a larger chord error is taken.

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
+#include <opencascade/BRepBndLib.hxx>
 #include <opencascade/BRepBuilderAPI_Sewing.hxx>
 #include <opencascade/BRep_Builder.hxx>
+#include <opencascade/Bnd_Box.hxx>
 #include <opencascade/TopExp_Explorer.hxx>
 #include <opencascade/TopTools_MapOfShape.hxx>
 #include <opencascade/TopoDS.hxx>
@@ -184,6 +187,28 @@ double sufficient_chord_mm(const Tessellation& how, double triangles) {
   return 10 * decade;
 }
 
+// The diagonal of the box around all leaves, mm; an upper bound.
+double diagonal_mm(const std::vector<Leaf>& leaves) {
+  std::map<std::string, Bnd_Box> boxes;
+  Bnd_Box whole;
+  for (const Leaf& leaf : leaves) {
+    const auto [known, is_new] = boxes.try_emplace(leaf.key);
+    if (is_new) BRepBndLib::Add(XCAFDoc_ShapeTool::GetShape(leaf.product), known->second, false);
+    if (!known->second.IsVoid()) whole.Add(known->second.Transformed(leaf.placed));
+  }
+  return whole.IsVoid() ? 0 : std::sqrt(whole.SquareExtent());
+}
+
+// Small models are cut more finely than asked for, so that their boxes hold, too. Not where a large chord
+// error is asked for, to have fewer triangles.
+Tessellation for_size(const std::vector<Leaf>& leaves, Tessellation how) {
+  constexpr double k_share = 2e-4;  // of the diagonal
+  if (how.chord_mm > Tessellation().chord_mm) return how;
+  if (const double diagonal = diagonal_mm(leaves); diagonal > 0)
+    how.chord_mm = std::min(how.chord_mm, k_share * diagonal);
+  return how;
+}
+
 // The first source that is no more as it was; empty: all are.
 std::string changed_source(const fs::path& path, const std::vector<CadSource>& sources) {
   for (std::size_t i = 0; i < sources.size(); ++i)
@@ -196,8 +221,12 @@ std::string changed_source(const fs::path& path, const std::vector<CadSource>& s
 // Builds the model leaf by leaf.
 class Builder {
  public:
-  Builder(const fs::path& path, const OcctDocument& document, const Tessellation& how)
-      : path_(path), document_(document), how_(how) {}
+  // `asked` is how the user wants the model, `how` is how it is cut.
+  Builder(const fs::path& path,
+          const OcctDocument& document,
+          const Tessellation& asked,
+          const Tessellation& how)
+      : path_(path), document_(document), asked_(asked), how_(how) {}
 
   Status add(const Leaf& leaf, double share_after) {
     const auto [known, is_new] = meshes_of_.try_emplace(leaf.key);
@@ -288,22 +317,43 @@ class Builder {
     if (cut.open_edges > 0 && ++open_ <= k_most_open)
       model_.warnings.push_back(
           fmt::format("'{}': the surface does not close ({} open edges)", name, cut.open_edges));
-    if (cut.mesh.chord_error_mm > how_.chord_mm)
+    if (cut.mesh.chord_error_mm > asked_.chord_mm)
       model_.warnings.push_back(
           fmt::format("'{}': the chord error is {:.2g} mm (larger than {} mm in {} faces)", name,
-                      cut.mesh.chord_error_mm, how_.chord_mm, cut.coarse_faces));
+                      cut.mesh.chord_error_mm, asked_.chord_mm, cut.coarse_faces));
     model_.meshes.push_back(std::move(cut.mesh));
     return model_.meshes.size() - 1;
   }
 
   const fs::path& path_;
   const OcctDocument& document_;
-  const Tessellation& how_;
+  const Tessellation& asked_;
+  const Tessellation how_;
   std::map<std::string, Named> meshes_of_;
   std::size_t triangles_ = 0;
   int open_ = 0, hidden_ = 0;
   CadModel model_;
 };
+
+// Cuts all leaves; the first `loose` ones of an IGES file are surfaces of one mesh.
+Result<CadModel> cut_all(Builder builder,
+                         const Leaves& leaves,
+                         std::ptrdiff_t loose,
+                         ProgressLines* progress) {
+  const std::size_t first = static_cast<std::size_t>(loose), count = leaves.all.size();
+  builder.add_loose({leaves.all.begin(), leaves.all.begin() + loose});
+  LIMN_TRY_STATUS(builder.check_count(1));
+  for (std::size_t i = first; i < count; ++i) {
+    const double share = static_cast<double>(i + 1 - first) / static_cast<double>(count - first);
+    LIMN_TRY_STATUS(builder.add(leaves.all[i], share));
+    progress->advance(share);
+  }
+  CadModel model = builder.take_model();
+  if (const int hidden = leaves.hidden + builder.hidden(); hidden > 0)
+    model.warnings.push_back(
+        fmt::format("{} hidden {} left out", hidden, hidden == 1 ? "shape is" : "shapes are"));
+  return model;
+}
 
 }  // namespace
 
@@ -311,23 +361,16 @@ Result<CadModel> read_cad_model(const fs::path& path, const Tessellation& how, P
   LIMN_TRY(const OcctDocument document, read_document(path, progress));
   progress->begin_stage("cutting into triangles", k_translated_percent, k_cut_percent);
   LIMN_TRY(Leaves leaves, leaves_of(document.document, path));
-  Builder builder(path, document, how);
-  if (document.format == "IGES") {
-    const auto loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), is_whole);
-    builder.add_loose({loose, leaves.all.end()});
-    leaves.all.erase(loose, leaves.all.end());
-    LIMN_TRY_STATUS(builder.check_count(1));
-  }
-  for (std::size_t i = 0; i < leaves.all.size(); ++i) {
-    const double share = static_cast<double>(i + 1) / static_cast<double>(leaves.all.size());
-    LIMN_TRY_STATUS(builder.add(leaves.all[i], share));
-    progress->advance(share);
-  }
-  CadModel model = builder.take_model();
+  std::ptrdiff_t loose = 0;
+  if (document.format == "IGES")
+    loose = std::stable_partition(leaves.all.begin(), leaves.all.end(), std::not_fn(is_whole)) -
+            leaves.all.begin();
+  const Tessellation fine = for_size(leaves.all, how);
+  auto cut = cut_all(Builder(path, document, how, fine), leaves, loose, progress);
+  if (!cut && fine.chord_mm < how.chord_mm)  // too many triangles
+    cut = cut_all(Builder(path, document, how, how), leaves, loose, progress);
+  LIMN_TRY(CadModel model, std::move(cut));
   model.warnings.insert(model.warnings.begin(), document.warnings.begin(), document.warnings.end());
-  if (const int hidden = leaves.hidden + builder.hidden(); hidden > 0)
-    model.warnings.push_back(
-        fmt::format("{} hidden {} left out", hidden, hidden == 1 ? "shape is" : "shapes are"));
   if (model.nodes.empty())
     return error(
         "{}: expected {} with surfaces, found only {}. Export solids or surfaces by their boundaries.",

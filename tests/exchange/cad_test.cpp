@@ -134,6 +134,10 @@ TEST_F(Cad, TheChordErrorHoldsOnCurvedSurfaces) {
   EXPECT_GT(worst_of(ball, from_ball), 0.001_mm) << "far too many triangles";
   for (std::size_t i = 0; i < ball.positions.size(); ++i)  // normals are the surface's own, outwards
     EXPECT_GT(ball.normals[i].dot(ball.positions[i].normalized()), 0.9999F);
+  StepText small;  // is cut to a share of its size
+  small.part("pearl", {small.sphere(1)});
+  const auto from_pearl = [](const Vector3d& p) { return p.norm() - 0.001; };
+  EXPECT_LE(worst_of(load(write("pearl.step", small.file())), from_pearl), 0.001_mm);
   const json fine = report(folder / "ring.step", {"--chord-mm", "0.01"});
   EXPECT_LE(fine["chord_error_mm"].get<double>(), 0.01);
   EXPECT_LE(worst_of(load(folder / "out.glb"), from_ring), 0.01_mm);
