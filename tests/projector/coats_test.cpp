@@ -2,6 +2,7 @@
 #include <cmath>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "projector/composite_policy.h"
 #include "scene/tangents.h"
@@ -139,37 +140,94 @@ TEST_F(CoatsTest, ATextureInCoordinatesThatAreMissingIsPlain) {
   EXPECT_TRUE(seen) << seen.message();
 }
 
-// Each map has its own effect: without it, or in the other coordinates, the picture is another.
-TEST_F(CoatsTest, EveryMapOfAClearLayerIsSeenInItsOwnCoordinates) {
-  const Mesh whole = lacquered(-0.08, k_bow);
-  Room room = room_with(scene::Mode::view, whole);
-  using Texture = scene::Texture;
-  const std::function<Texture&(scene::Material*)> maps[] = {
-      [](scene::Material* m) -> Texture& { return m->coat.factor_map; },
-      [](scene::Material* m) -> Texture& { return m->coat.roughness_map; },
-      [](scene::Material* m) -> Texture& { return m->coat.normals; },
-      [](scene::Material* m) -> Texture& { return m->maps.occlusion; },
-      [](scene::Material* m) -> Texture& { return m->maps.emission; },
-      [](scene::Material* m) -> Texture& { return m->maps.normals; },
-      [](scene::Material* m) -> Texture& { return m->maps.metallic_roughness; }};
+// A map and two of its colours that are seen to differ.
+struct TwoColours {
+  std::string name;
+  std::function<scene::Texture&(scene::Material*)> map;
+  Vector3d left, right;
+};
+
+std::vector<TwoColours> all_maps() {
+  using scene::Material, scene::Texture;
+  const Vector3d leaning = 0.5 * (Vector3d(0.5, 0.3, 1).normalized() + Vector3d::Ones()),
+                 upright(0.5, 0.5, 1);
+  return {{"coat", [](Material* m) -> Texture& { return m->coat.factor_map; }, {0, 1, 1}, {1, 0, 0}},
+          {"coat roughness",
+           [](Material* m) -> Texture& { return m->coat.roughness_map; },
+           {1, 0.1, 1},
+           {0, 1, 0}},
+          {"coat normals", [](Material* m) -> Texture& { return m->coat.normals; }, leaning, upright},
+          {"occlusion", [](Material* m) -> Texture& { return m->maps.occlusion; }, {0, 1, 1}, {1, 0, 0}},
+          {"emission", [](Material* m) -> Texture& { return m->maps.emission; }, {0, 0, 0}, {1, 1, 1}},
+          {"normals", [](Material* m) -> Texture& { return m->maps.normals; }, leaning, upright},
+          {"metal and roughness",
+           [](Material* m) -> Texture& { return m->maps.metallic_roughness; },
+           {0, 0.4, 0},
+           {1, 1, 1}}};
+}
+
+// A map with one colour on its left half and another one on its right half is seen like the plain map of the
+// first one where its own coordinates are on the left, and like that of the second one elsewhere.
+TEST_F(CoatsTest, EveryMapIsSeenInItsOwnCoordinates) {
+  Mesh bare = lacquered(-0.08, k_bow);
+  scene::Material& material = bare.materials[0];
+  material.maps = {};
+  material.coat = {.factor = 0.9F, .roughness = 0.8F};
+  material.emitted = {0.03F, 0.03F, 0.03F};
+  Room room = room_with(scene::Mode::view, bare);
   std::vector<scene::Variant>& variants = room.scene.slots[0].variants;
-  for (const auto& map : maps) {
-    Mesh without = whole, elsewhere = whole;
-    map(&without.materials[0]).image = cv::Mat();
-    Texture& other = map(&elsewhere.materials[0]);
-    other.in_second_uvs = !other.in_second_uvs;
-    variants.push_back({fmt::format("without map {}", &map - maps), without});
-    variants.push_back({fmt::format("map {} elsewhere", &map - maps), elsewhere});
+  const auto halves = [](const Vector3d& left, const Vector3d& right, bool in_second) {
+    return painted([&](double u, double) { return u < 0.5 ? left : right; }, in_second);
+  };
+  const char* const sets[] = {"first", "second"};
+  for (const bool in_second : {false, true}) {
+    Mesh mask = bare;  // white on the right
+    mask.materials = {scene::Material()};
+    mask.materials[0].base_colour = {1, 1, 1};
+    mask.materials[0].unlit = true;
+    mask.materials[0].texture = halves({0, 0, 0}, {1, 1, 1}, false).image;
+    if (in_second) mask.uvs = mask.second_uvs;
+    variants.push_back({sets[in_second], mask});
+    for (const TwoColours& one : all_maps()) {
+      Mesh mesh = bare;
+      scene::Texture& map = one.map(&mesh.materials[0]);
+      map = halves(one.left, one.right, in_second);
+      variants.push_back({one.name + sets[in_second], mesh});
+      map = halves(one.left, one.left, false);
+      if (!in_second) variants.push_back({one.name + " left", mesh});
+      map = halves(one.right, one.right, false);
+      if (!in_second) variants.push_back({one.name + " right", mesh});
+    }
   }
   Renderer drawing = renderer(room.scene, room.rig);
   const auto composite = [&](const std::string& variant) {
     room.posed.parts[0].variant = variant;
     return drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
   };
-  const cv::Mat wanted = composite("a");
-  // A clear layer mirrors little; rounding alone changes one level.
-  for (std::size_t i = 1; i < variants.size(); ++i)
-    EXPECT_GT(cv::norm(composite(variants[i].name), wanted, cv::NORM_INF), 3) << variants[i].name;
+  // The part without its rim, left and right, and without what is near the middle of the map.
+  cv::Mat on_part;
+  cv::cvtColor(composite("emission right"), on_part, cv::COLOR_BGR2GRAY);
+  cv::erode(on_part > 0, on_part, cv::Mat(), {-1, -1}, 5);
+  for (const char* set : sets) {
+    cv::Mat white, left, right;
+    cv::cvtColor(composite(set), white, cv::COLOR_BGR2GRAY);
+    cv::erode(white < 1, left, cv::Mat(), {-1, -1}, 5);
+    cv::erode(white > 254, right, cv::Mat(), {-1, -1}, 5);
+    left &= on_part;
+    ASSERT_GT(cv::countNonZero(left), 5000);
+    ASSERT_GT(cv::countNonZero(right), 5000);
+    for (const TwoColours& one : all_maps()) {
+      const cv::Mat found = composite(one.name + set);
+      for (const bool is_right : {false, true}) {
+        const cv::Mat wanted = composite(one.name + (is_right ? " right" : " left"));
+        // Rounding changes one level. A clear layer mirrors little.
+        EXPECT_LE(cv::norm(found, wanted, cv::NORM_INF, is_right ? right : left), 1)
+            << one.name << ", " << set;
+        EXPECT_GT(cv::norm(found, wanted, cv::NORM_INF, is_right ? left : right), 3)
+            << one.name << ", " << set;
+      }
+    }
+  }
 }
 
 }  // namespace
