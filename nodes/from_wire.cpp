@@ -147,6 +147,7 @@ scene::RoomLight WireReading::light(const limn_v1_RoomLight& in) {
   out.lamps = list(in.lamps, [](const limn_v1_Lamp& lamp) {
     return scene::RoomLight::Lamp{vector(lamp.d_world), vector(lamp.strength_rgb)};
   });
+  out.image_strength = in.image_strength;
   return out;
 }
 
@@ -158,6 +159,7 @@ scene::PosedScene WireReading::posed(const limn_v1_PosedScene& in) {
     return scene::Viewpoint{text(viewpoint.viewer), vector(viewpoint.p_world), viewpoint.weight};
   });
   out.light = optional(in.light, &WireReading::light);
+  out.finish = text(in.finish);
   return out;
 }
 

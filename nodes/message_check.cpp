@@ -88,6 +88,7 @@ void check(const scene::RoomLight& light, MessageCheck* to) {
     to->finite_matrix("light.lamps", lamp.d_world);
     to->finite_matrix("light.lamps", lamp.strength_rgb);
   }
+  to->finite("light.image_strength", {light.image_strength});
 }
 
 void check(const scene::PosedPart& part, MessageCheck* to) {
@@ -109,6 +110,7 @@ void check(const scene::PosedScene& posed, MessageCheck* to) {
     to->finite("posed.viewpoints", {viewpoint.weight});
   }
   if (posed.light) check(*posed.light, to);
+  to->text("posed.finish", posed.finish);
 }
 
 void check(const Track& track, MessageCheck* to) {

@@ -164,6 +164,7 @@ void WireFilling::light(const scene::RoomLight& in, limn_v1_RoomLight* out) {
     vector(lamp.d_world, &to->d_world);
     vector(lamp.strength_rgb, &to->strength_rgb);
   });
+  out->image_strength = in.image_strength;
 }
 
 void WireFilling::posed(const scene::PosedScene& in, limn_v1_PosedScene* out) {
@@ -175,6 +176,7 @@ void WireFilling::posed(const scene::PosedScene& in, limn_v1_PosedScene* out) {
     to->weight = viewpoint.weight;
   });
   optional(in.light, &out->light, [this](const auto& item, auto* to) { light(item, to); });
+  text(in.finish, &out->finish);
 }
 
 void WireFilling::overlay(const projector::SplitOverlay& in, limn_v1_Overlay* out) {

@@ -12,17 +12,19 @@ enum class Define {
   cached_shares,   ///< The image is a projector's: its blending shares are in the hit cache.
   work_list,       ///< The shader processes a pixel list instead of rectangles.
   surface_maps,    ///< Materials have maps besides their colour, or emit light.
+  finish,          ///< The prototype has a finish.
   clearcoat,       ///< Materials have a clear layer.
   second_uvs,      ///< Textures lie in second texture coordinates.
   vertex_colours,  ///< Meshes have colours at their corners.
+  room_image,      ///< A picture of the room lights parts.
   surface_parts,   ///< Surface parts (lying on the prototype) may be visible.
   view_parts       ///< View parts (drawn for the viewer's position) may be visible.
 };
 
 /// Each Define as shaders spell it, in the order of the enumeration.
 inline constexpr std::array k_define_names = {
-    "BY_MEASUREMENT", "CONTACT_SHADOW", "CACHED_SHARES",  "WORK_LIST",     "SURFACE_MAPS",
-    "CLEARCOAT",      "SECOND_UVS",     "VERTEX_COLOURS", "SURFACE_PARTS", "VIEW_PARTS"};
+    "BY_MEASUREMENT", "CONTACT_SHADOW", "CACHED_SHARES",  "WORK_LIST",  "SURFACE_MAPS",  "FINISH",
+    "CLEARCOAT",      "SECOND_UVS",     "VERTEX_COLOURS", "ROOM_IMAGE", "SURFACE_PARTS", "VIEW_PARTS"};
 
 /// The names that a shader is compiled with.
 class Defines {

@@ -29,6 +29,7 @@ struct GpuMaterial {
   Eigen::Vector4f coat = {0, 0, 1, -1};
   Eigen::Vector4f more_maps = {-1, -1, -1, 0};
   Eigen::Vector4i second = Eigen::Vector4i::Zero();
+  Eigen::Vector4f image_u = Eigen::Vector4f::Zero(), image_v = Eigen::Vector4f::Zero();
 };
 
 // As in shaders/material.glsl.
@@ -323,6 +324,8 @@ GpuScene::GpuScene(const scene::Scene& scene) {
     }
     slots_.push_back(std::move(runs));
   }
+  has_room_image_ = scene.room_image.has_value();
+  for (const scene::Finish& finish : scene.finishes) add_finish(finish, &staging);
   corners_ = buffer_of(std::exchange(staging.corners, {}));  // each array is freed after its upload
   staging.normals.insert(staging.normals.end(), staging.after_normals.begin(), staging.after_normals.end());
   normals_ = buffer_of(std::exchange(staging.normals, {}));
@@ -378,6 +381,29 @@ void GpuScene::add_material(const scene::Material& material, const scene::Mesh& 
     gpu.more_maps.y() = add_map(coat.roughness_map, k_second_coat_roughness, &gpu, &staging->maps);
     gpu.coat.w() = add_map(coat.normals, k_second_coat_normals, &gpu, &staging->maps);
     has_surface_maps_ |= coat.has_maps();
+  }
+  staging->materials.push_back(gpu);
+}
+
+void GpuScene::add_finish(const scene::Finish& finish, Staging* staging) {
+  constexpr int k_decal_image = 1, k_pattern_image = 2, k_projected_image = 4;  // as in shaders/finish.glsl
+  finishes_.push_back({finish.name, static_cast<int>(staging->materials.size()), finish.for_viewer});
+  GpuMaterial gpu{finish.base_colour.cast<float>().homogeneous(), Eigen::Vector4f::Constant(-1)};
+  gpu.colour.w() = 0;
+  gpu.parameters.tail<3>() << static_cast<float>(finish.metallic), static_cast<float>(finish.roughness), 0;
+  gpu.coat.head<2>() << static_cast<float>(finish.clearcoat), static_cast<float>(finish.clearcoat_roughness);
+  has_coated_finish_ |= finish.clearcoat > 0;
+  if (const auto& image = finish.image) {
+    gpu.parameters.x() = layer_of(image->texture, &staging->colour_maps);
+    gpu.second.z() = image->repeats ? k_pattern_image : k_decal_image;
+    if (const auto& projection = image->projection) {
+      gpu.second.z() |= k_projected_image;
+      const Eigen::Matrix4d image_from_prototype = projection->prototype_from_image.inverse().matrix();
+      gpu.image_u = (image_from_prototype.row(0) / projection->size_m.x()).cast<float>();
+      gpu.image_v = (image_from_prototype.row(1) / projection->size_m.y()).cast<float>();
+      gpu.image_u.w() += 0.5F;
+      gpu.image_v.w() += 0.5F;
+    }
   }
   staging->materials.push_back(gpu);
 }
@@ -464,14 +490,19 @@ Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {
 void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const {
   const Pose from_world = scene_from_world(posed);
   runs->clear();
-  if (prototype_ && posed.world_from_prototype) runs->push_back({0, &*prototype_, Pose()});
+  if (prototype_ && posed.world_from_prototype) {
+    runs->push_back({0, &*prototype_, Pose()});
+    const auto finish = std::find_if(finishes_.begin(), finishes_.end(),
+                                     [&](const GpuFinish& known) { return known.name == posed.finish; });
+    if (finish != finishes_.end()) runs->back().finish = static_cast<int>(finish - finishes_.begin());
+  }
   for (const scene::PosedPart& part : posed.parts) {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].name != part.slot) continue;
       const auto variant = slots_[i].variants.find(part.variant);
       LIMN_CHECK(variant != slots_[i].variants.end());
       runs->push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
-                       slots_[i].on_surface, part.material});
+                       slots_[i].on_surface, -1, part.material});
     }
   }
 }
@@ -486,6 +517,10 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
     if (placed.material.base_colour) owner.colour = placed.material.base_colour->cast<float>().homogeneous();
     owner.metallic_roughness.x() = static_cast<float>(placed.material.metallic.value_or(-1));
     owner.metallic_roughness.y() = static_cast<float>(placed.material.roughness.value_or(-1));
+    if (placed.finish < 0) continue;
+    const GpuFinish& finish = finishes_[static_cast<std::size_t>(placed.finish)];
+    owner.metallic_roughness.z() = static_cast<float>(finish.material + 1);
+    owner.metallic_roughness.w() = finish.for_viewer ? 1 : 0;
   }
   glNamedBufferSubData(*placements_, 0, static_cast<GLsizeiptr>(gpu_owners_.size() * sizeof(GpuOwner)),
                        gpu_owners_.data());

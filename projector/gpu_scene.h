@@ -39,6 +39,7 @@ struct PlacedRun {
   const TriangleRun* run = nullptr;
   Pose scene_from_owner;
   bool on_surface = false;  ///< Whether its slot's mode is `surface`.
+  int finish = -1;          ///< Index in the scene of the prototype's finish; -1: none.
   scene::MaterialOverride material = {};
 };
 
@@ -68,7 +69,13 @@ class GpuScene final : public Bindable {
     return (has_surface_maps_ ? Defines{Define::surface_maps} : Defines{}) +
            (has_clearcoat_ ? Defines{Define::clearcoat} : Defines{}) +
            (has_second_uvs_ ? Defines{Define::second_uvs} : Defines{}) +
-           (has_vertex_colours_ ? Defines{Define::vertex_colours} : Defines{});
+           (has_vertex_colours_ ? Defines{Define::vertex_colours} : Defines{}) +
+           (has_room_image_ ? Defines{Define::room_image} : Defines{});
+  }
+  /// The same for a prototype with a finish.
+  Defines finish_defines() const {
+    return shading_defines() + Defines{Define::finish} +
+           (has_coated_finish_ ? Defines{Define::clearcoat} : Defines{});
   }
   GLuint vertex_array() const { return *vertex_array_; }
   int owner_count() const { return static_cast<int>(slots_.size()) + 1; }
@@ -85,9 +92,11 @@ class GpuScene final : public Bindable {
     Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when the part is shown
     Eigen::Vector4f upper = Eigen::Vector4f::Zero();  // w: 1 when its mode is surface
     Eigen::Vector4f colour = Eigen::Vector4f::Zero();
-    Eigen::Vector4f metallic_roughness = Eigen::Vector4f::Constant(-1);
+    // The prototype's has also z: its finish's material + 1, or 0; w: 1 when the finish is for the viewer.
+    Eigen::Vector4f metallic_roughness = {-1, -1, 0, 0};
   };
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
+  void add_finish(const scene::Finish& finish, Staging* staging);
   void add_material(const scene::Material& material, const scene::Mesh& mesh, Staging* staging);
   void add_second_uvs(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
   void add_tangents(const scene::Mesh& mesh, std::size_t first_material, Staging* staging);
@@ -95,8 +104,14 @@ class GpuScene final : public Bindable {
 
   std::optional<TriangleRun> prototype_;
   std::vector<SlotRuns> slots_;
+  struct GpuFinish {
+    std::string name;
+    int material = 0;  // index in the materials
+    bool for_viewer = false;
+  };
+  std::vector<GpuFinish> finishes_;
   bool has_cut_outs_ = false, has_surface_maps_ = false, has_clearcoat_ = false, has_second_uvs_ = false,
-       has_vertex_colours_ = false;
+       has_coated_finish_ = false, has_vertex_colours_ = false, has_room_image_ = false;
   std::vector<GpuOwner> gpu_owners_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
   GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers

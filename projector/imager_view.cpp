@@ -55,13 +55,12 @@ CompositeWeights::CompositeWeights(std::span<const CompositePolicy> policies,
         bytes_[owner / 4] |= static_cast<GLuint>(std::lround(255 * treatment.full_weight())) << owner % 4 * 8;
 }
 
-Result<ImagerView> ImagerView::create(const Shared& shared,
-                                      const scene::Scene& scene_in,
-                                      Defines shading_defines) {
+Result<ImagerView> ImagerView::create(const Shared& shared, const scene::Scene& scene_in) {
   using enum Resource;
   ImagerView view(shared);
   for (const scene::Slot& slot : scene_in.slots) view.slot_names_.push_back(slot.name);
-  LIMN_TRY(view.parts_passes_, PartsPasses::link(shading_defines));
+  const GpuScene& gpu = shared.scene.scene();
+  LIMN_TRY(view.parts_passes_, PartsPasses::link(gpu.shading_defines(), gpu.finish_defines()));
   LIMN_TRY(view.composite_pass_,
            FullscreenPass::link({.shader = "composite.frag", .reads = {light, camera_image}}));
   LIMN_TRY(view.coverage_pass_,
@@ -93,7 +92,8 @@ bool ImagerView::Overlay::keeps_other_pixels(const Imager& imager_now,
                                              const scene::PosedScene& posed_now,
                                              const CompositeWeights& weights_now) const {
   return posed && weights == weights_now && is_same_prototype(*posed, posed_now) &&
-         posed->light == posed_now.light && is_same(imager.imager_from_world, imager_now.imager_from_world);
+         posed->light == posed_now.light && posed->finish == posed_now.finish &&
+         is_same(imager.imager_from_world, imager_now.imager_from_world);
 }
 
 // The overlay drawn for this imager before, or a new one.
@@ -125,10 +125,11 @@ void ImagerView::draw_parts(const Imager& imager,
   const bool is_view = overlay->is_view;
   scene.prepare(posed, is_view ? SceneCache::FromProjectors::nothing : SceneCache::FromProjectors::prototype);
   const GpuLens& lens = scene.lens_of(imager);
+  const bool sees_prototype = is_view || scene.has_finish();
   const double around_m = has_contact_shadow_ ? ContactShadow::k_reach : 0;
   const auto places_of = [&](const std::vector<PlacedRun>& runs) {
-    return scene.visibility().visible_rects(imager, lens.baked, runs, scene.scene_from_world(), is_view,
-                                            around_m);
+    return scene.visibility().visible_rects(imager, lens.baked, runs, scene.scene_from_world(),
+                                            sees_prototype, around_m);
   };
   const cv::Size size(imager.width, imager.height);
   if (!overlay->keeps_other_pixels(imager, posed, weights)) {
@@ -140,7 +141,7 @@ void ImagerView::draw_parts(const Imager& imager,
   add_changed(overlay->runs, scene.runs(), &changed);
   const std::vector<cv::Rect> places = without_overlaps(places_of(changed));
   clear_light(overlay->parts.texture, size, places, 0);
-  if (!is_view) std::erase_if(changed, [](const PlacedRun& run) { return run.owner == 0; });
+  if (!sees_prototype) std::erase_if(changed, [](const PlacedRun& run) { return run.owner == 0; });
   scene.draw_from_imager_over(imager, changed, around_m);
   Resources resources = scene.resources(lens, imager)
                             .with(Resource::albedo, shared_.balance.albedo())
@@ -149,8 +150,9 @@ void ImagerView::draw_parts(const Imager& imager,
     contact_shadow_->place(posed);
     resources = resources.with(Resource::contact_shadow, *contact_shadow_);
   }
-  parts_passes_.draw({.is_view = is_view, .is_shadowed = has_contact_shadow_}, {overlay->parts.texture, size},
-                     places, smoothing_, resources, &shared_.times);
+  parts_passes_.draw(
+      {.is_view = is_view, .is_shadowed = has_contact_shadow_, .is_painted = scene.has_finish()},
+      {overlay->parts.texture, size}, places, smoothing_, resources, &shared_.times);
   overlay->runs = scene.runs();
   overlay->places = places_of(scene.runs());
   overlay->posed = posed;

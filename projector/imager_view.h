@@ -33,8 +33,7 @@ class CompositeWeights final : public Bindable {
 /// Draws the parts as cameras, viewers and virtual cameras see them.
 class ImagerView {
  public:
-  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines).
-  static Result<ImagerView> create(const Shared& shared, const scene::Scene& scene, Defines shading_defines);
+  static Result<ImagerView> create(const Shared& shared, const scene::Scene& scene);
 
   /// As Renderer::set_smoothing and set_contact_shadow.
   void set_smoothing(const Smoothing& smoothing) { smoothing_ = smoothing; }

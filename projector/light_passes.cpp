@@ -52,6 +52,7 @@ Result<LightPasses> LightPasses::link(Defines shading_defines, bool by_measureme
   LightPasses passes;
   const Defines balance = by_measurement ? Defines{Define::by_measurement} : Defines{};
   const Defines drawing = shading_defines + balance;
+  const Defines finish = shading_defines.contains(Define::finish) ? Defines{Define::finish} : Defines{};
   const std::vector<Resource> rays = {scene, viewpoints, lens, projector};
   LIMN_TRY(passes.hits_,
            ComputePass::link({.shader = "light_hits.comp", .reads = rays, .writes = {hit_cache}}));
@@ -83,7 +84,7 @@ Result<LightPasses> LightPasses::link(Defines shading_defines, bool by_measureme
     ByMode& mode = passes.modes_[i];
     LIMN_TRY(mode.find_candidates,
              ComputePass::link({.shader = "light_candidates.comp",
-                                .defines = modes[i],
+                                .defines = modes[i] + finish,
                                 .reads = {scene, viewpoints, projector, hit_cache, light_balance},
                                 .writes = {work_list}}));
     const std::vector<Resource> reads = {scene,     viewpoints, lens,         room_light,

@@ -8,21 +8,26 @@
 
 namespace limn::projector {
 
-Result<PartsPasses> PartsPasses::link(Defines shading_defines) {
+Result<PartsPasses> PartsPasses::link(Defines shading_defines, Defines finish_defines) {
   using enum Resource;
   PartsPasses passes;
   passes.shading_defines_ = shading_defines;
-  LIMN_TRY(passes.plain_, Both::link(shading_defines));
+  passes.finish_defines_ = finish_defines;
+  LIMN_TRY_STATUS(passes.link_programs(false, false));
   LIMN_TRY(passes.find_edges_,
            ComputePass::link({.shader = "edges.comp", .reads = {light}, .writes = {work_list}}));
   return passes;
 }
 
-Status PartsPasses::link_shadowed() {
-  if (shadowed_) return {};
-  LIMN_TRY(shadowed_, Both::link(shading_defines_ + Defines{Define::contact_shadow}));
+Status PartsPasses::link_programs(bool is_shadowed, bool is_painted) {
+  std::optional<Both>& programs = programs_[is_shadowed ? 1 : 0][is_painted ? 1 : 0];
+  if (programs) return {};
+  const Defines shadow = is_shadowed ? Defines{Define::contact_shadow} : Defines{};
+  LIMN_TRY(programs, Both::link((is_painted ? finish_defines_ : shading_defines_) + shadow));
   return {};
 }
+
+Status PartsPasses::link_shadowed() { return link_programs(true, false); }
 
 auto PartsPasses::Both::link(Defines defines) -> Result<Both> {
   using enum Resource;
@@ -54,7 +59,8 @@ void PartsPasses::draw(What what,
                        const Smoothing& smoothing,
                        const Resources& resources_in,
                        PassTimes* times) {
-  Both& both = what.is_shadowed ? *shadowed_ : plain_;
+  if (what.is_painted) LIMN_CHECK(link_programs(what.is_shadowed, true).ok());
+  Both& both = *programs_[what.is_shadowed ? 1 : 0][what.is_painted ? 1 : 0];
   const Steps& steps = what.is_view ? both.view : both.parts;
   // Where places overlap, pixels are listed more than once.
   const int room = target.size.area() * static_cast<int>(std::max<std::size_t>(1, places.size()));

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core/types.hpp>
 #include <optional>
 #include <vector>
@@ -18,14 +19,15 @@ struct Smoothing;
 /// samples at edges, and then the few pixels that need an extra pass.
 class PartsPasses {
  public:
-  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines).
-  static Result<PartsPasses> link(Defines shading_defines);
+  /// The defines of the shading programs: GpuScene::shading_defines() and finish_defines().
+  static Result<PartsPasses> link(Defines shading_defines, Defines finish_defines);
   /// Links the programs with contact shadows. Further calls do nothing.
   Status link_shadowed();
 
   struct What {
     bool is_view;      ///< A virtual camera's view, with the prototype; else parts over a camera's image.
     bool is_shadowed;  ///< With contact shadows; link_shadowed() must have been called.
+    bool is_painted;   ///< The prototype has a finish.
   };
   struct Target {
     const GlName& light;  ///< GL_RGBA32F
@@ -49,9 +51,11 @@ class PartsPasses {
     Steps parts, view;
     static Result<Both> link(Defines defines);
   };
-  Defines shading_defines_;
-  Both plain_;
-  std::optional<Both> shadowed_;
+  Status link_programs(bool is_shadowed, bool is_painted);
+
+  Defines shading_defines_, finish_defines_;
+  // By contact shadows (1: with them), and by the prototype's finish (1: it has one); linked on demand.
+  std::array<std::array<std::optional<Both>, 2>, 2> programs_;
   ComputePass find_edges_;
   PixelList work_list_;      // first the pixels that may see something, then those at edges
   PixelList deferred_list_;  // pixels at edges with samples that light may not show

@@ -48,10 +48,10 @@ void ProjectorView::CachedImage::mark_valid_for(const scene::PosedScene& posed_n
   is_current = true;
 }
 
-Result<ProjectorView> ProjectorView::create(const Shared& shared, Defines shading_defines) {
+Result<ProjectorView> ProjectorView::create(const Shared& shared) {
   using enum Resource;
   ProjectorView view(shared);
-  LIMN_TRY(view.light_passes_, LightPasses::link(shading_defines, false));
+  LIMN_TRY_STATUS(view.link_light(false, false));
   LIMN_TRY(view.response_pass_, ComputePass::link({.shader = "light_response.comp",
                                                    .reads = {viewpoints, projector, light, response},
                                                    .writes = {target}}));
@@ -68,12 +68,17 @@ Result<ProjectorView> ProjectorView::create(const Shared& shared, Defines shadin
   return view;
 }
 
-Status ProjectorView::link_measured() {
-  if (measured_light_passes_) return {};
-  const Defines shading_defines = shared_.scene.scene().shading_defines();
-  LIMN_TRY(measured_light_passes_, LightPasses::link(shading_defines, true));
+// Links the programs for a bare prototype, or those for one with a finish.
+Status ProjectorView::link_light(bool by_measurement, bool is_painted) {
+  std::optional<LightPasses>& passes = light_passes_[by_measurement ? 1 : 0][is_painted ? 1 : 0];
+  if (passes) return {};
+  const GpuScene& scene = shared_.scene.scene();
+  LIMN_TRY(passes,
+           LightPasses::link(is_painted ? scene.finish_defines() : scene.shading_defines(), by_measurement));
   return {};
 }
+
+Status ProjectorView::link_measured() { return link_light(true, false); }
 
 void ProjectorView::invalidate() {
   for (CachedImage& cached : cached_images_) cached.is_current = false;
@@ -90,13 +95,15 @@ const Smoothing& ProjectorView::smoothing(bool is_quick) const {
 
 LightPasses& ProjectorView::light_passes() {
   const bool by_measurement = shared_.balance.options().compensation == Compensation::measured;
-  return by_measurement ? *measured_light_passes_ : light_passes_;
+  const bool is_painted = shared_.scene.has_finish();
+  if (is_painted) LIMN_CHECK(link_light(by_measurement, true).ok());
+  return *light_passes_[by_measurement ? 1 : 0][is_painted ? 1 : 0];
 }
 
-// Finds where there may be light: at the parts, or on the whole prototype with even black.
+// Finds where there may be light: at the parts, or on the whole prototype with even black or a finish.
 void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
   const SceneCache& scene = shared_.scene;
-  if (shared_.balance.options().even_black) {
+  if (shared_.balance.options().even_black || scene.has_finish()) {
     light_places_.clear();
     light_places_.both.push_back(
         scene.visibility().prototype_rect(index, scene.runs(), scene.scene_from_world()));

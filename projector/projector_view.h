@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
@@ -23,8 +24,7 @@ struct Shared {
 /// Draws the projectors' images, and data about their pixels.
 class ProjectorView {
  public:
-  /// `shading_defines`: the defines of the shading programs (GpuScene::shading_defines).
-  static Result<ProjectorView> create(const Shared& shared, Defines shading_defines);
+  static Result<ProjectorView> create(const Shared& shared);
 
   /// Links the programs for Compensation::measured. Must be called before drawing with it; further calls do
   /// nothing.
@@ -76,14 +76,15 @@ class ProjectorView {
       : shared_(shared), cached_images_(shared.rig.projectors.size()) {}
   bool is_quick() const;
   const Smoothing& smoothing(bool is_quick) const;
+  Status link_light(bool by_measurement, bool is_painted);
   LightPasses& light_passes();
   void find_places(std::size_t index, const Imager& viewer);
   void draw_light(std::size_t index, const Canvas& light, const Resources& resources);
   void draw_display(std::size_t index, const Canvas& light, const Resources& resources);
 
   Shared shared_;
-  LightPasses light_passes_;
-  std::optional<LightPasses> measured_light_passes_;  // linked on demand
+  // By compensation (1: by measurement), and by the prototype's finish (1: it has one); linked on demand.
+  std::array<std::array<std::optional<LightPasses>, 2>, 2> light_passes_;
   ComputePass response_pass_;
   FullscreenPass points_pass_, blend_pass_;
   std::vector<GlName> responses_;

@@ -53,9 +53,8 @@ Result<Renderer> Renderer::create(const scene::Scene& scene, const Rig& rig) {
   LIMN_TRY(LightBalance balance, LightBalance::create(scene));
   auto base = std::make_unique<Impl::Base>(
       Impl::Base{rig, std::move(times), std::move(cache), std::move(balance), {}});
-  const Defines shading_defines = base->scene.scene().shading_defines();
-  LIMN_TRY(ProjectorView projectors, ProjectorView::create(base->shared(), shading_defines));
-  LIMN_TRY(ImagerView imagers, ImagerView::create(base->shared(), scene, shading_defines));
+  LIMN_TRY(ProjectorView projectors, ProjectorView::create(base->shared()));
+  LIMN_TRY(ImagerView imagers, ImagerView::create(base->shared(), scene));
   LIMN_TRY_STATUS(check_gl_memory("the scene"));
   return Renderer(std::make_unique<Impl>(Impl{std::move(base), std::move(projectors), std::move(imagers)}));
 }

@@ -86,8 +86,9 @@ class Renderer {
 
   /// The image for projector `index` of the rig: CV_8UC3, BGR display values by its measured response (gamma
   /// 2.2 without one). `view` parts are drawn as seen from the viewer's position, also outside the viewer's
-  /// image; elsewhere the image is black. Light is shared with the other projectors that reach the same
-  /// point, so that the sum in linear light is the part's colour, compensated as set_light says.
+  /// image; elsewhere it shows the prototype's finish, or is black. Light is shared with the other projectors
+  /// that reach the same point, so that the sum in linear light is the part's colour, compensated as
+  /// set_light says.
   cv::Mat projector_image(std::size_t index, const scene::PosedScene& posed, const Imager& viewer);
 
   /// The same image, kept on the GPU: draws it if anything has changed, and returns the name of its texture
@@ -139,8 +140,8 @@ class Renderer {
                     const scene::PosedScene& posed,
                     std::span<const CompositePolicy> policies);
 
-  /// The prototype (in its albedo) and the parts as a person or a virtual camera sees them, sRGB BGR, over a
-  /// plain `background`.
+  /// The prototype (in its albedo or its finish) and the parts as a person or a virtual camera sees them,
+  /// sRGB BGR, over a plain `background`.
   cv::Mat view(const Imager& imager, const scene::PosedScene& posed, const cv::Scalar& background);
 
   /// How each posed part can be shown. A viewer pixel of a part counts as projected if the ray through its

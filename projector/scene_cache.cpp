@@ -5,7 +5,7 @@
 namespace limn::projector {
 bool is_same(const PlacedRun& a, const PlacedRun& b) {
   return a.owner == b.owner && a.run == b.run && is_same(a.scene_from_owner, b.scene_from_owner) &&
-         a.material == b.material;
+         a.material == b.material && a.finish == b.finish;
 }
 
 bool is_same_lens(const Imager& a, const Imager& b) {
@@ -26,7 +26,7 @@ SceneCache::SceneCache(const scene::Scene& scene,
     : scene_(scene),
       visibility_(std::move(visibility)),
       occlusion_(rig.projectors.size()),
-      room_lighting_(scene.light),
+      room_lighting_(scene),
       times_(times) {}
 
 void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) {
@@ -55,6 +55,10 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
   if (!all) return;
   visibility_.draw_surface_parts_from_projectors(scene_, runs_, scene_from_world_);
   are_surface_parts_drawn_ = true;
+}
+
+bool SceneCache::has_finish() const {
+  return std::any_of(runs_.begin(), runs_.end(), [](const PlacedRun& run) { return run.finish >= 0; });
 }
 
 void SceneCache::draw_from_viewer(const Imager& viewer) {

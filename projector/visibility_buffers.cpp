@@ -385,9 +385,9 @@ void VisibilityBuffers::draw_from_viewer(const GpuScene& scene,
                                          const Pose& scene_from_world,
                                          const Eigen::Vector3d& p_viewer_scene,
                                          const Eigen::Vector3d& d_up_scene) {
-  const Eigen::AlignedBox3d box = box_of(runs, is_view_part);
+  const Eigen::AlignedBox3d prototype = box_of(runs, is_prototype), parts = box_of(runs, is_view_part),
+                            box = parts.isEmpty() ? prototype : parts;
   const Pose pose = box.isEmpty() ? Pose() : looking_at(p_viewer_scene, box.center(), d_up_scene);
-  const Eigen::AlignedBox3d prototype = box_of(runs, is_prototype);
   double focal = 1;
   for (const Imager& projector : projectors_) {
     const Eigen::Vector3d p_projector =

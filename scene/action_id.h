@@ -17,6 +17,7 @@ enum class ActionId {
   unpair,
   units,
   material,
+  finish,
   save_look,
   restore_look,
   next_look,

@@ -109,6 +109,15 @@ Status set_material(Change* change, const MaterialOverride& material) {
   return {};
 }
 
+Status set_finish(Change* change, const std::string& name) {
+  const std::vector<std::string> names = finish_names(change->scene);
+  if (!name.empty() && std::find(names.begin(), names.end(), name) == names.end())
+    return error("{}: expected one of the scene's finishes ({}), or none for the bare prototype, found '{}'.",
+                 change->name, listed(names), name);
+  change->show_state.finish = name;
+  return {};
+}
+
 std::string unused_look_name(const ShowState& show_state) {
   for (int i = 1;; ++i)
     if (std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
@@ -128,6 +137,7 @@ Status save_look(Change* change, const std::string& name) {
     look.parts.push_back(
         {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material});
   look.light = posed.light ? posed.light : change->scene.light;
+  look.finish = posed.finish;
   remember_look(look.name, &show_state);
   std::erase_if(show_state.looks, [&](const Look& known) { return known.name == look.name; });
   show_state.looks.push_back(std::move(look));
@@ -353,12 +363,19 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .value = "a colour, metalness, roughness, - for the file's: #c02818 0 0.4",
      .what = "sets the material of all of the part's variants; empty: the file's materials",
      .functions = k_by<read_material, set_material>},
+    {.id = ActionId::finish,
+     .name = "finish",
+     .role = work,
+     .argument_kind = maybe_text,
+     .value = "a finish of the scene",
+     .what = "paints the whole prototype in light; empty: not",
+     .functions = k_by<read_text, set_finish>},
     {.id = ActionId::save_look,
      .name = "save_look",
      .role = work,
      .argument_kind = maybe_text,
      .value = "a name; empty: look-01 and so on",
-     .what = "saves variants, poses, materials and light, as JSON and PNG",
+     .what = "saves variants, poses, materials, finish and light, as JSON and PNG",
      .keys = {Key{'S'}},
      .functions = k_by<read_text, save_look>},
     {.id = ActionId::restore_look,

@@ -29,9 +29,18 @@ nlohmann::ordered_json list_of(const Eigen::Vector3d& v) { return {v.x(), v.y(),
 
 }  // namespace
 
-RoomLight read_room_light(const ConfigNode& node) {
-  node.only({"up_world", "soft_below", "soft_above", "lamps"});
+RoomLight read_room_light(const ConfigNode& node, bool may_have_image) {
+  if (may_have_image)
+    node.only({"up_world", "soft_below", "soft_above", "lamps", "image", "image_strength"});
+  else
+    node.only({"up_world", "soft_below", "soft_above", "lamps", "image_strength"});
   RoomLight light;
+  light.image_strength = may_have_image && node.find("image") ? 1 : 0;
+  if (const auto strength = node.find("image_strength")) {
+    light.image_strength = strength->number();
+    if (light.image_strength < 0 || light.image_strength > k_most_light)
+      strength->problem(fmt::format("expected 0 to {}, found {}.", k_most_light, light.image_strength));
+  }
   light.d_up_world = read_direction(node.at("up_world"));
   light.below_rgb = read_light_rgb(node.at("soft_below"));
   light.above_rgb = read_light_rgb(node.at("soft_above"));
@@ -50,10 +59,12 @@ nlohmann::ordered_json to_json(const RoomLight& light) {
   nlohmann::ordered_json lamps = nlohmann::ordered_json::array();
   for (const RoomLight::Lamp& lamp : light.lamps)
     lamps.push_back({{"towards_world", list_of(lamp.d_world)}, {"strength", list_of(lamp.strength_rgb)}});
-  return {{"up_world", list_of(light.d_up_world)},
-          {"soft_below", list_of(light.below_rgb)},
-          {"soft_above", list_of(light.above_rgb)},
-          {"lamps", lamps}};
+  nlohmann::ordered_json json = {{"up_world", list_of(light.d_up_world)},
+                                 {"soft_below", list_of(light.below_rgb)},
+                                 {"soft_above", list_of(light.above_rgb)},
+                                 {"lamps", lamps}};
+  if (light.image_strength != 0) json["image_strength"] = light.image_strength;
+  return json;
 }
 
 Result<LightNumbers> light_numbers_of(const std::string& words) {

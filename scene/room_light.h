@@ -24,11 +24,13 @@ struct RoomLight {
   Eigen::Vector3d below_rgb = Eigen::Vector3d::Zero();
   Eigen::Vector3d above_rgb = Eigen::Vector3d::Zero();
   std::vector<Lamp> lamps;
+  double image_strength = 0;  ///< Factor on the light of the scene's picture of the room; 0: it is not used.
   bool operator==(const RoomLight&) const = default;
 };
 
-/// Reads `light` of scene.json or of a look file. Problems are recorded at the node.
-RoomLight read_room_light(const ConfigNode& node);
+/// Reads `light` of scene.json or of a look file. Problems are recorded at the node. `may_have_image`: it may
+/// have `image` (scene/room_image.h), and then the image's strength is 1 if it is absent.
+RoomLight read_room_light(const ConfigNode& node, bool may_have_image = false);
 /// The light as JSON for read_room_light(), with full precision.
 nlohmann::ordered_json to_json(const RoomLight& light);
 

@@ -207,6 +207,18 @@ Control read_control(const ConfigNode& node, const Scene& scene) {
   return control;
 }
 
+std::vector<Finish> read_finishes(const ConfigNode& node, const Scene& scene) {
+  std::vector<Finish> finishes;
+  for (const ConfigNode& item : node.items()) {
+    Finish finish = read_finish(item);
+    if (find_named(finishes, finish.name))
+      item.at("name").problem(fmt::format("expected a unique name, found '{}' twice.", finish.name));
+    finishes.push_back(std::move(finish));
+  }
+  if (!scene.prototype) node.problem("expected a prototype to paint, found a scene without.");
+  return finishes;
+}
+
 Imager read_viewer_imager(const ConfigNode& node) {
   node.only({"schema", "world_from_viewer", "size", "fov_deg"});
   const Pose world_from_viewer = node.at("world_from_viewer").pose();
@@ -508,7 +520,13 @@ Status load_files(const Reader& reader,
     if (reader.albedo_image) {
       LIMN_TRY_STATUS(load_albedo_image(*reader.albedo_image, path, &*scene->prototype));
     }
+    for (Finish& finish : scene->finishes)
+      if (const Status image = load_finish_image(!scene->prototype->mesh.uvs.empty(), &finish); !image)
+        return error("{}: finishes: {}", path.string(), image.message());
   }
+  if (scene->room_image)
+    if (const Status image = load_room_image(&*scene->room_image); !image)
+      return error("{}: light.image: {}", path.string(), image.message());
   std::span<const MeshFile> listed = reader.part_meshes;
   for (Slot& slot : scene->slots) {
     const auto own = listed.first(slot.variants.size());
@@ -531,6 +549,12 @@ const Viewer* Scene::find_tablet(const std::string& guest) const {
 }
 
 const Slot* Scene::find_slot(const std::string& name) const { return find_named(slots, name); }
+
+std::vector<std::string> finish_names(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const Finish& finish : scene.finishes) names.push_back(finish.name);
+  return names;
+}
 
 std::string to_text(const SkippedVariant& skipped) {
   return fmt::format("{} of slot {} is left out: {}", skipped.variant, skipped.slot, skipped.why);
@@ -558,7 +582,7 @@ Result<Scene> load_scene(const fs::path& path,
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "prototype", "slots", "controls", "viewer", "light"});
+  root.only({"schema", "prototype", "slots", "controls", "viewer", "light", "finishes"});
   Scene scene;
   Reader reader;
   scene.folder = config.folder();
@@ -568,7 +592,12 @@ Result<Scene> load_scene(const fs::path& path,
     for (const ConfigNode& item : controls->items()) scene.controls.push_back(read_control(item, scene));
   }
   if (const auto node = root.find("viewer")) scene.viewers = read_viewers(*node, scene);
-  if (const auto node = root.find("light")) scene.light = read_room_light(*node);
+  if (const auto node = root.find("light")) {
+    scene.light = read_room_light(*node, true);
+    if (const auto image = node->find("image"))
+      scene.room_image = read_room_image(*image, scene.light->d_up_world);
+  }
+  if (const auto node = root.find("finishes")) scene.finishes = read_finishes(*node, scene);
   LIMN_TRY_STATUS(config.status());
   if (const Status distinct = check_distinct(constellations(scene)); !distinct)
     return error("{}: {}", file.string(), distinct.message());

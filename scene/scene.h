@@ -13,7 +13,9 @@
 #include "core/marker.h"
 #include "core/result.h"
 #include "scene/action_id.h"
+#include "scene/finish.h"
 #include "scene/mesh.h"
+#include "scene/room_image.h"
 #include "scene/room_light.h"
 
 namespace limn::scene {
@@ -87,14 +89,18 @@ struct Scene {
   std::optional<Prototype> prototype;  ///< Absent: parts are shown over a camera image only.
   std::vector<Slot> slots;
   std::vector<Control> controls;
-  std::vector<Viewer> viewers;     ///< Several share one viewpoint (scene/viewpoint.h).
-  std::optional<RoomLight> light;  ///< Absent: soft light and a lamp that move with the viewer.
+  std::vector<Viewer> viewers;               ///< Several share one viewpoint (scene/viewpoint.h).
+  std::vector<Finish> finishes = {};         ///< What the prototype can be painted with in light.
+  std::optional<RoomLight> light;            ///< Absent: soft light and a lamp that move with the viewer.
+  std::optional<RoomImage> room_image = {};  ///< What RoomLight::image_strength is about.
 
   const Slot* find_slot(const std::string& name) const;
   /// The viewer for a guest's tablet: the one with the guest's name, else the one for every guest. Null when
   /// the tablet is not a viewer.
   const Viewer* find_tablet(const std::string& guest) const;
 };
+
+std::vector<std::string> finish_names(const Scene& scene);
 
 /// What is left out of a scene, and why: a variant whose mesh cannot be loaded, or (named by its whole file
 /// name) something in slots/ that is no variant.

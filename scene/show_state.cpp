@@ -101,6 +101,7 @@ ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) 
     }
   }
   show_state.light = look.light;
+  show_state.finish = look.finish;
   remember_look(look.name, &show_state);
   return show_state;
 }
@@ -230,6 +231,7 @@ PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::s
     part.material =
         show_state.slots[static_cast<std::size_t>(scene.find_slot(part.slot) - scene.slots.data())].material;
   out.light = show_state.light;
+  out.finish = show_state.finish;
   return out;
 }
 
@@ -241,6 +243,7 @@ std::string look_json(const Look& look) {
     slot = {{"variant", part.variant}, {"prototype_from_part", to_json(part.prototype_from_part)}};
     if (!part.material.is_none()) slot["material"] = to_json(part.material);
   }
+  if (!look.finish.empty()) json["finish"] = look.finish;
   if (look.light) json["light"] = to_json(*look.light);
   return json_text(json, 2) + "\n";
 }
@@ -248,7 +251,7 @@ std::string look_json(const Look& look) {
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, "limn.look/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "name", "slots", "light"});
+  root.only({"schema", "name", "slots", "light", "finish"});
   Look look;
   look.name = root.at("name").text();
   if (!is_look_name(look.name))
@@ -268,6 +271,7 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
       look.parts.back().material = read_material_override(*material);
   }
   if (const auto light = root.find("light")) look.light = read_room_light(*light);
+  if (const auto finish = root.find("finish")) look.finish = finish->choice(finish_names(scene));
   LIMN_TRY_STATUS(config.status());
   return look;
 }

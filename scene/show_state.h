@@ -34,6 +34,7 @@ struct Look {
   std::string name;
   std::vector<Part> parts;
   std::optional<RoomLight> light = {};  ///< Absent: the scene's own light.
+  std::string finish = {};              ///< The prototype's finish; empty: none.
 };
 
 /// A part's pose that is held until its marker is moved.
@@ -72,6 +73,7 @@ struct ShowState {
   Screen screen = Screen::rest;  ///< The last choice for all screens.
   std::vector<Output> screens = {};  ///< The session's screens, in the order of its devices file.
   std::optional<RoomLight> light;    ///< Light instead of the scene's own.
+  std::string finish;                ///< The prototype's finish, of Scene::finishes; empty: none.
   Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< Up for `light` if the scene has no light.
   Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< Towards the viewers, for `light`.
   /// A guest for whose tablet `view` parts are drawn; empty: the scene's own viewers.
@@ -87,7 +89,8 @@ std::vector<std::string> look_names(const ShowState& show_state);
 bool is_look_name(const std::string& name);
 /// The look of that name; null when there is none.
 const Look* find_look(const ShowState& show_state, const std::string& name);
-/// The show state with the look's variants, poses, materials and light. The look becomes the one last shown.
+/// The show state with the look's variants, poses, materials, finish and light. The look becomes the one last
+/// shown.
 ShowState with_look(const Scene& scene, ShowState show_state, const Look& look);
 /// Makes it the look last shown; the former one becomes `other_look`.
 void remember_look(const std::string& name, ShowState* show_state);
@@ -117,7 +120,7 @@ std::vector<Track> assign_tracks(const Scene& scene,
 ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
 /// The scene at a moment, from tracks (of assign_tracks()) and the show state: posed() with the chosen
-/// variants, nudges, pins, materials and light.
+/// variants, nudges, pins, materials, finish and light.
 PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
 /// The show state that is drawn on the left of the split line: this one with the other look. Nullopt without
@@ -131,7 +134,8 @@ std::string pairings_json(const Scene& scene, const ShowState& show_state);
 Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& scene, ShowState show_state);
 
 /// The text of a limn.look/1 file; load_look() reads it. A look without materials or light uses those of the
-/// project's files. Error: unknown slots or variants, or numbers that are not a pose, material or light.
+/// project's files. Error: unknown slots, variants or finishes, or numbers that are not a pose, material or
+/// light.
 std::string look_json(const Look& look);
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene);
 

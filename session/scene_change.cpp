@@ -91,6 +91,7 @@ scene::ShowState with_variants_of(const scene::Scene& next,
         shown = name;
     if (!is_in(shown, names)) shown = names.front();
   }
+  if (!find_named(next.finishes, show_state.finish)) show_state.finish.clear();
   return show_state;
 }
 

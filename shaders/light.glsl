@@ -4,7 +4,7 @@
 #include "scene.glsl"
 #include "lens.glsl"
 #include "projector_blending.glsl"
-#include "shading.glsl"
+#include "finish.glsl"
 #include "on_surface.glsl"
 #include "balance.glsl"
 
@@ -58,9 +58,9 @@ bool is_same_surface(CentreShare centre, Hit hit, Place place, float footprint) 
   return abs(hit.t - centre.t) < k_steepest * footprint && dot(place.d_flat, centre.d_flat) > k_same_side;
 }
 
-// The colour that should be visible at a place at distance t along the projector's ray; a: 0 where there is
-// none.
-vec4 wanted_colour(Place place, float t) {
+// The colour that should be visible at a place of the prototype at distance t along the projector's ray; a: 0
+// where there is none.
+vec4 wanted_colour(Hit prototype, Place place, float t) {
   float footprint = t / viewpoint_at(u_projector).quality.x;
   vec4 colour = vec4(0);
 #ifdef VIEW_PARTS
@@ -68,6 +68,12 @@ vec4 wanted_colour(Place place, float t) {
 #endif
 #ifdef SURFACE_PARTS
   if (colour.a == 0.0) colour = surface_colour(place, footprint);
+#endif
+#ifdef FINISH
+  if (colour.a == 0.0 && has_finish()) {
+    vec3 d = normalize(place.p - viewpoint_at(u_viewer).p_origin.xyz);
+    colour = vec4(finish_light(prototype, place.p, place.d_flat, d, footprint), 1);
+  }
 #endif
   return colour;
 }
@@ -86,7 +92,7 @@ Sample sample_at(vec2 px, CentreShare centre) {
   vec3 d = ray_of(projector, px);
   Hit prototype = first_hit(s_projector_ids, projector, 0, d);
   Place place = place_at(prototype, d);
-  vec4 colour = wanted_colour(place, prototype.t);
+  vec4 colour = wanted_colour(prototype, place, prototype.t);
   bool gives_light = prototype.id != 0u && (colour.a > 0.0 || u_even_black);
   bool uses_centre_share = is_same_surface(centre, prototype, place, prototype.t / projector.quality.x);
   return Sample(prototype, place, colour, gives_light, uses_centre_share);
@@ -97,14 +103,14 @@ vec4 light_of(Sample s, Share share) {
   return vec4(balanced(u_projector, s.colour, share, s.place, s.prototype), 1);
 }
 
-// False only if the pixel's centre certainly gives no light: the viewer sees no part there, and none lies on
-// the surface.
+// False only if the pixel's centre certainly gives no light: the viewer sees no part there, none lies on the
+// surface, and the prototype has no finish.
 bool may_give_light(ivec2 at) {
   Hit prototype = cached_hit(at);
   if (prototype.id == 0u) return false;
   uint first = 3u * (prototype.id - 1u);
   vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * prototype.weights;
-  bool may_give = u_even_black;
+  bool may_give = u_even_black || has_finish();
 #ifdef VIEW_PARTS
   vec4 share;
   Viewpoint viewer = viewpoint_at(u_viewer);

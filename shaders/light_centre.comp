@@ -14,7 +14,7 @@ void main() {
   Hit prototype = cached_hit(at);
   Viewpoint projector = viewpoint_at(u_projector);
   Place place = place_at(prototype, ray_of(projector, vec2(at)));
-  vec4 colour = wanted_colour(place, distance(place.p, projector.p_origin.xyz));
+  vec4 colour = wanted_colour(prototype, place, distance(place.p, projector.p_origin.xyz));
   if (colour.a == 0.0 && !u_even_black) return;
   if (is_share_cached(at))
     colour = vec4(balanced(u_projector, colour, cached_share(at), place, prototype), 1);

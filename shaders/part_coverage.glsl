@@ -3,7 +3,7 @@
 #include "scene.glsl"
 #include "lens.glsl"
 #include "projector_blending.glsl"
-#include "shading.glsl"
+#include "finish.glsl"
 #include "on_surface.glsl"
 
 layout(binding = k_viewer_ids_unit) uniform usampler2DArray s_viewer_ids;

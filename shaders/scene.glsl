@@ -31,7 +31,8 @@ struct Material {
   vec4 more_maps;  // layers of s_maps, or -1: share of the clear layer (x), its roughness (y), occlusion where
                    // it lies in other coordinates than roughness and metalness (z)
   ivec4 second;  // x: offset to the corner's second texture coordinates, likewise; y: bits k_second_… of the
-                 // textures that lie in them
+                 // textures that lie in them; z: of a finish: bits of finish.glsl for its image
+  vec4 image_u, image_v;  // of a finish with a projected image: its u and v are the products with (p, 1)
 };
 layout(std430, binding = k_materials_buffer) readonly buffer Materials { Material s_materials[]; };
 // Colour textures, one in each layer; sRGB is decoded on reading.
@@ -43,7 +44,8 @@ struct Owner {
   vec4 lower;  // lower bound, owner frame; w: 1 when the part is shown
   vec4 upper;  // upper bound; w: 1 when its mode is surface
   vec4 colour; // override of the materials' colour, linear light, where w is 1
-  vec4 metallic_roughness;  // overrides, where not negative
+  vec4 metallic_roughness;  // overrides, where not negative; of the prototype z: its finish's material + 1,
+                            // or 0; w: 1 when the finish is for the viewer
 };
 layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 8 for each owner
 

@@ -14,9 +14,36 @@ uniform bool u_has_room_light;  // else the light moves with the viewer
 // Soft light of which the share `above` comes from above.
 vec3 soft_light(float above) { return mix(u_soft_below.rgb, u_soft_above.rgb, above); }
 
+#ifdef ROOM_IMAGE
+// The picture of the room of projector/room_image_levels.h; its third coordinate is the level. Its frame: right,
+// up, ahead.
+layout(binding = k_room_image_unit) uniform sampler3D s_room_image;
+uniform mat3 u_image_from_scene;
+uniform float u_image_strength;
+const float k_roughness_levels = 9.0, k_diffuse_level = k_roughness_levels, k_levels = k_roughness_levels + 1.0;
+
+vec3 image_light(vec3 d_scene, float level) {
+  const float k_pi = 3.14159265358979;
+  vec3 d = u_image_from_scene * d_scene;
+  vec2 level_d = abs(d.x) + abs(d.z) < 1e-6 ? vec2(0, 1) : d.xz;  // right above or below, any column will do
+  vec2 uv = vec2(0.5 + atan(level_d.x, level_d.y) / (2.0 * k_pi), acos(clamp(d.y, -1.0, 1.0)) / k_pi);
+  return u_image_strength * textureLod(s_room_image, vec3(uv, (level + 0.5) / k_levels), 0.0).rgb;
+}
+vec3 diffuse_image_light(vec3 n) { return image_light(n, k_diffuse_level); }
+vec3 glossy_image_light(vec3 d, float roughness) {
+  return image_light(d, (k_roughness_levels - 1.0) * pow(roughness, 2.0 / 3.0));
+}
+#else
+vec3 diffuse_image_light(vec3 n) { return vec3(0); }
+vec3 glossy_image_light(vec3 d, float roughness) { return vec3(0); }
+#endif
+
+// Soft light and the picture of the room, reflected by a white diffuse surface.
+vec3 diffuse_soft_light(vec3 n) { return soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz)) + diffuse_image_light(n); }
+
 // Light reflected by a white diffuse surface.
 vec3 diffuse_light(vec3 n) {
-  vec3 light = soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
+  vec3 light = diffuse_soft_light(n);
   for (int i = 0; i < u_lamp_count; ++i) light += u_lamps[i].rgb * max(0.0, dot(n, u_d_lamps[i].xyz));
   return light;
 }
@@ -36,7 +63,7 @@ vec3 specular_soft_light(vec3 f0, float roughness, vec3 n, vec3 d_view) {
   vec4 share = brdf_lut_at(max(0.0, dot(n, d_view)), roughness);
   vec3 d = normalize(mix(n, reflect(-d_view, n), share.a));
   float above = brdf_lut_at(0.5 + 0.5 * dot(d, u_d_up.xyz), roughness).b;
-  return soft_light(above) * (f0 * share.r + share.g);
+  return (soft_light(above) + glossy_image_light(d, roughness)) * (f0 * share.r + share.g);
 }
 
 // Light of a lamp reflected by a surface with a diffuse colour and a reflectance at normal incidence
@@ -74,7 +101,7 @@ vec3 shaded(SurfaceMaterial surface, vec3 d_view) {
   vec3 n = surface.n;
   float specular = surface.is_diffuse ? 0.0 : 1.0;
   vec3 diffuse = surface.base * (1.0 - surface.metallic), f0 = mix(vec3(0.04), surface.base, surface.metallic);
-  vec3 colour = (1.0 - specular * f0) * diffuse * soft_light(0.5 + 0.5 * dot(n, u_d_up.xyz));
+  vec3 colour = (1.0 - specular * f0) * diffuse * diffuse_soft_light(n);
   colour += specular * specular_soft_light(f0, surface.roughness, n, d_view);
   colour *= surface.occlusion;
   for (int i = 0; i < u_lamp_count; ++i)
@@ -101,14 +128,18 @@ vec3 radiance_along(vec3 d, Hit hit, float footprint) {
   return shaded(turned_to_viewer(surface, facing_sign(surface.n_smooth, hit, d), d), -d);
 }
 
-// Colour of a part that lies on the surface. It is the same for every viewer: shaded as seen along the
-// prototype's normal, and illuminated from there if no room light is known.
-vec3 radiance_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
-  if (is_unlit(hit)) return base_colour(hit, footprint);
-  SurfaceMaterial surface = surface_material_at(hit, footprint);
+// Light of a surface that is the same for every viewer: shaded as seen along the prototype's normal, and
+// illuminated from there if no room light is known.
+vec3 light_on_surface(SurfaceMaterial surface, vec3 d_prototype_normal) {
   float side = dot(surface.n_smooth, d_prototype_normal) < 0.0 ? -1.0 : 1.0;
   surface = turned_to_viewer(surface, side, -d_prototype_normal);
   if (u_has_room_light) return shaded(surface, d_prototype_normal);
   vec3 light = surface.occlusion * u_soft_above.rgb + u_lamps[0].rgb * dot(surface.n, d_prototype_normal);
   return surface.base * light + surface.emitted;
+}
+
+// Colour of a part that lies on the surface.
+vec3 radiance_on_surface(Hit hit, vec3 d_prototype_normal, float footprint) {
+  if (is_unlit(hit)) return base_colour(hit, footprint);
+  return light_on_surface(surface_material_at(hit, footprint), d_prototype_normal);
 }

@@ -2,7 +2,7 @@
 #include "bindings.glsl"
 #include "scene.glsl"
 #include "lens.glsl"
-#include "shading.glsl"
+#include "finish.glsl"
 #include "contact.glsl"
 
 layout(binding = k_viewer_ids_unit) uniform usampler2DArray s_viewer_ids;
@@ -21,8 +21,11 @@ vec4 view_at(vec2 px) {
   }
   if (prototype.id == 0u) return vec4(0);
   vec3 n = facing_normal(prototype, d);
+  float shadow = k_contact_shadow ? contact_shadow(viewer.p_origin.xyz + prototype.t * d, n) : 0.0;
+  if (has_finish())
+    return vec4((1.0 - shadow) * finish_light(prototype, viewer.p_origin.xyz + prototype.t * d, n, d,
+                                              prototype.t / viewer.quality.x), 1);
   vec2 uv = uv_of(prototype);
   vec3 colour = u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb * diffuse_light(n);
-  float shadow = k_contact_shadow ? contact_shadow(viewer.p_origin.xyz + prototype.t * d, n) : 0.0;
   return vec4((1.0 - shadow) * colour, 1);
 }

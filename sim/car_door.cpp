@@ -427,6 +427,32 @@ nlohmann::ordered_json pose_json(const Pose& pose) {
           {"translation_m", {digits(t.x()), digits(t.y()), digits(t.z())}}};
 }
 
+// What the door is painted with in light: a lacquer whose reflections are the viewer's, and a matt paint.
+std::vector<scene::Finish> door_finishes() {
+  scene::Finish lacquer, sand;
+  lacquer.name = "blue lacquer";
+  lacquer.base_colour = {0.008, 0.07, 0.28};
+  lacquer.metallic = 0.8;
+  lacquer.roughness = 0.3;
+  lacquer.clearcoat = 1;
+  lacquer.clearcoat_roughness = 0.03;
+  lacquer.for_viewer = true;
+  sand.name = "matt sand";
+  sand.base_colour = {0.6, 0.45, 0.3};
+  return {lacquer, sand};
+}
+
+nlohmann::ordered_json finish_json(const scene::Finish& finish) {
+  const Vector3d& rgb = finish.base_colour;
+  return {{"name", finish.name},
+          {"base_colour", {rgb.x(), rgb.y(), rgb.z()}},
+          {"metallic", finish.metallic},
+          {"roughness", finish.roughness},
+          {"clearcoat", finish.clearcoat},
+          {"clearcoat_roughness", finish.clearcoat_roughness},
+          {"mode", finish.for_viewer ? "view" : "surface"}};
+}
+
 nlohmann::ordered_json slot_json(const scene::Slot& slot) {
   nlohmann::ordered_json json = {{"name", slot.name},
                                  {"marker", slot.marker.text()},
@@ -487,6 +513,7 @@ scene::Scene car_door_scene() {
   trim.variants.push_back({"line", {}});
   scene.slots = {mirror, trim};
   scene.slots[1].variants[0].mesh = trim_mesh(clay, prototype_from_part(scene, "trim", clay));
+  scene.finishes = door_finishes();
   scene.viewers.emplace_back();
   scene.viewers[0].fixed =
       viewer_imager(world_from_viewer(), k_viewer_size[0], k_viewer_size[1], k_viewer_fov_deg);
@@ -515,6 +542,7 @@ std::map<std::string, std::string> car_door_files() {
     for (const scene::Variant& variant : slot.variants)
       files[slot.name + "-" + variant.name + ".glb"] = scene::encode_glb(variant.mesh);
   }
+  for (const scene::Finish& finish : scene.finishes) json["finishes"].push_back(finish_json(finish));
   json["viewer"]["fixed"] = {{"world_from_viewer", pose_json(world_from_viewer())},
                              {"size", {k_viewer_size[0], k_viewer_size[1]}},
                              {"fov_deg", k_viewer_fov_deg}};

@@ -9,9 +9,9 @@ namespace limn::sim {
 
 /// The project's own prototype: a clay-like car-door panel, 0.6 x 0.4 m with 0.1 m of relief (barrel, swage
 /// line, handle recess), eight AprilTag plates, a rear-view mirror in three variants (slot "mirror") and a
-/// trim line on the surface (slot "trim"). Frame: x right (towards the rear of the car), y up, z out of the
-/// door towards the viewer; the origin is in the panel's middle. config/scenes/door holds the files made from
-/// this; a test compares them.
+/// trim line on the surface (slot "trim"), and two finishes. Frame: x right (towards the rear of the car), y
+/// up, z out of the door towards the viewer; the origin is in the panel's middle. config/scenes/door holds
+/// the files made from this; a test compares them.
 scene::Scene car_door_scene();
 
 /// Where the slots' markers stand on the door: slot name -> prototype_from_marker. They are not part of the

@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <span>
 
 namespace limn::sim {
 namespace {
@@ -23,6 +25,7 @@ constexpr double k_least_roughness = 0.03;  // smoother surfaces reflect soft li
 constexpr double k_horizon_height = 0.3;
 // Directions of reflected soft light: accurate to 0.4 %, see reference_brdf_test.
 constexpr int k_directions = 256;
+constexpr int k_image_directions = 512;  // for a picture of the room, which is less smooth
 constexpr int k_fresnel_directions = 1024, k_fresnel_nodes = 65;
 
 Vector3d bgr(const Vector3d& rgb) { return rgb.reverse(); }
@@ -34,17 +37,38 @@ Eigen::Vector2d even_point(int i) {
   return {x - std::floor(x), y - std::floor(y)};
 }
 
-// Soft light from direction d, as the light of a white diffuse surface in uniform light of this strength.
-Vector3d soft_from(const scene::RoomLight& room, const Vector3d& d) {
+// The light that surfaces reflect: a room's soft light and lamps, and a picture of the room.
+struct Light {
+  const scene::RoomLight& room;
+  const RoomImageSizes* image_sizes;  // null: none
+  bool has_image() const { return image_sizes != nullptr && room.image_strength > 0; }
+};
+
+// Soft light from direction d, which stands for a solid angle, as the light of a white diffuse surface in
+// uniform light of this strength.
+Vector3d soft_from(const Light& light, const Vector3d& d, double solid_angle) {
+  const scene::RoomLight& room = light.room;
   const double height = std::clamp(d.dot(room.d_up_world) / k_horizon_height, -1.0, 1.0);
   const double above = 0.5 + 0.75 * height - 0.25 * height * height * height;
-  return bgr(room.below_rgb + above * (room.above_rgb - room.below_rgb));
+  const Vector3d soft = bgr(room.below_rgb + above * (room.above_rgb - room.below_rgb));
+  return light.has_image() ? Vector3d(soft + room.image_strength * light.image_sizes->from(d, solid_angle))
+                           : soft;
 }
 
 // All soft light reflected by a white diffuse surface.
-Vector3d soft_on(const scene::RoomLight& room, const Vector3d& n) {
-  const double above = (1 + n.dot(room.d_up_world)) / 2;
-  return bgr((1 - above) * room.below_rgb + above * room.above_rgb);
+Vector3d soft_on(const Light& light, const Vector3d& n) {
+  const double above = (1 + n.dot(light.room.d_up_world)) / 2;
+  const Vector3d soft = bgr((1 - above) * light.room.below_rgb + above * light.room.above_rgb);
+  if (!light.has_image()) return soft;
+  const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
+  Vector3d sum = Vector3d::Zero();
+  for (int i = 0; i < k_image_directions; ++i) {
+    const Eigen::Vector2d at = even_point(i);
+    const double ring = std::sqrt(at.x()), angle = 2 * std::numbers::pi * at.y();
+    const Vector3d d = ring * (std::cos(angle) * d_u + std::sin(angle) * d_v) + std::sqrt(1 - at.x()) * n;
+    sum += light.image_sizes->from(d, std::numbers::pi / (k_image_directions * std::max(0.05, d.dot(n))));
+  }
+  return soft + light.room.image_strength / k_image_directions * sum;
 }
 
 double schlick(double cosine) {
@@ -90,10 +114,11 @@ double mean_schlick(double cosine) {
 }
 
 // Slopes of half vectors along u and v, distributed as GGX with alpha 1.
-const std::array<Eigen::Vector2d, k_directions>& slopes() {
-  static const std::array<Eigen::Vector2d, k_directions> all = [] {
-    std::array<Eigen::Vector2d, k_directions> made;
-    for (int i = 0; i < k_directions; ++i) {
+template <int k_count>
+const std::array<Eigen::Vector2d, k_count>& slopes() {
+  static const std::array<Eigen::Vector2d, k_count> all = [] {
+    std::array<Eigen::Vector2d, k_count> made;
+    for (int i = 0; i < k_count; ++i) {
       const Eigen::Vector2d at = even_point(i);
       const double angle = 2 * std::numbers::pi * at.y();
       made[static_cast<std::size_t>(i)] =
@@ -105,37 +130,39 @@ const std::array<Eigen::Vector2d, k_directions>& slopes() {
 }
 
 // The reflected soft light, by importance sampling of GGX half vectors.
-Vector3d specular_soft_light(double roughness,
-                             const Vector3d& f0,
-                             const Vector3d& n,
-                             const Vector3d& d_view,
-                             const scene::RoomLight& room) {
+Vector3d specular_soft_light(
+    double roughness, const Vector3d& f0, const Vector3d& n, const Vector3d& d_view, const Light& light) {
   const double alpha = std::pow(std::max(roughness, k_least_roughness), 2);
   const double nv = std::max(1e-4, n.dot(d_view));
   const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
   Vector3d sum = Vector3d::Zero();
-  for (const Eigen::Vector2d& slope : slopes()) {
+  const std::span<const Eigen::Vector2d> all =
+      light.has_image() ? std::span<const Eigen::Vector2d>(slopes<k_image_directions>())
+                        : std::span<const Eigen::Vector2d>(slopes<k_directions>());
+  for (const Eigen::Vector2d& slope : all) {
     const Vector3d h = (alpha * (slope.x() * d_u + slope.y() * d_v) + n).normalized();
     const double vh = d_view.dot(h), nh = n.dot(h);
     const Vector3d d = 2 * vh * h - d_view;
     const double nl = n.dot(d);
     if (nl <= 0 || vh <= 0) continue;
     // The density of half vectors is D nh; that of directions is lower by the factor 4 vh.
-    sum += soft_from(room, d).cwiseProduct(fresnel(f0, vh)) * (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
+    const double density = ggx(nh, alpha) * nh / (4 * vh);  // number of directions in 1 sr
+    const Vector3d from_there = soft_from(light, d, 1 / (static_cast<double>(all.size()) * density));
+    sum += from_there.cwiseProduct(fresnel(f0, vh)) * (visibility(nl, nv, alpha) * nl * 4 * vh / nh);
   }
-  return sum / k_directions;
+  return sum / static_cast<double>(all.size());
 }
 
 // What a clear layer mirrors where it mirrors everything: soft light and lamps, by GGX alone.
 Vector3d mirrored_by_coat(const SurfaceMaterial& material,
                           const Vector3d& n,
                           const Vector3d& d_view,
-                          const scene::RoomLight& room) {
+                          const Light& light) {
   const double nv = std::max(1e-4, n.dot(d_view));
   const double alpha = std::pow(std::max(material.coat_roughness, k_lamp_roughness), 2);
   Vector3d sum =
-      material.occlusion * specular_soft_light(material.coat_roughness, Vector3d::Ones(), n, d_view, room);
-  for (const scene::RoomLight::Lamp& lamp : room.lamps) {
+      material.occlusion * specular_soft_light(material.coat_roughness, Vector3d::Ones(), n, d_view, light);
+  for (const scene::RoomLight::Lamp& lamp : light.room.lamps) {
     const double nl = n.dot(lamp.d_world);
     if (nl <= 0) continue;
     const Vector3d h = (d_view + lamp.d_world).normalized();
@@ -145,6 +172,21 @@ Vector3d mirrored_by_coat(const SurfaceMaterial& material,
 }
 
 }  // namespace
+
+RoomImageSizes::RoomImageSizes(const scene::RoomImage& image) : sizes_{image} {
+  while (sizes_.back().light.rows >= 8) {
+    scene::RoomImage half = sizes_.back();
+    cv::resize(sizes_.back().light, half.light, sizes_.back().light.size() / 2, 0, 0, cv::INTER_AREA);
+    sizes_.push_back(half);
+  }
+}
+
+Vector3d RoomImageSizes::from(const Vector3d& d_world, double solid_angle) const {
+  const double pixel =
+      2 * std::numbers::pi * std::numbers::pi / static_cast<double>(sizes_.front().light.total());
+  const double size = std::round(0.5 * std::log2(std::max(1.0, solid_angle / pixel)));
+  return sizes_[std::min(static_cast<std::size_t>(size), sizes_.size() - 1)].from(d_world).cast<double>();
+}
 
 PartsLight PartsLight::beside(const Imager& viewer) {
   const Eigen::Quaterniond world_from_viewer = viewer.imager_from_world.inverse().rotation;
@@ -160,17 +202,20 @@ Vector3d shaded(const SurfaceMaterial& material,
                 const Vector3d& n,
                 const Vector3d& d_view,
                 const scene::RoomLight& room,
-                const std::optional<Vector3d>& n_coat) {
+                const std::optional<Vector3d>& n_coat,
+                const RoomImageSizes* image_sizes) {
+  const Light light{room, image_sizes};
   const Vector3d diffuse = (1 - material.metallic) * material.base;
   const Vector3d f0 =
       (1 - material.metallic) * Vector3d::Constant(k_dielectric) + material.metallic * material.base;
   const double nv = std::max(1e-4, n.dot(d_view));
   const double alpha = std::pow(std::max(material.roughness, k_lamp_roughness), 2);
-  Vector3d soft = diffuse.cwiseProduct(soft_on(room, n)), by_lamps = Vector3d::Zero();
+  Vector3d soft = diffuse.isZero() ? Vector3d(diffuse) : Vector3d(diffuse.cwiseProduct(soft_on(light, n)));
+  Vector3d by_lamps = Vector3d::Zero();
   if (!material.is_diffuse) {
     const Vector3d mean = f0 + (Vector3d::Ones() - f0) * mean_schlick(nv);
     soft = soft.cwiseProduct(Vector3d::Ones() - mean) +
-           specular_soft_light(material.roughness, f0, n, d_view, room);
+           specular_soft_light(material.roughness, f0, n, d_view, light);
   }
   for (const scene::RoomLight::Lamp& lamp : room.lamps) {
     const double nl = n.dot(lamp.d_world);
@@ -190,7 +235,7 @@ Vector3d shaded(const SurfaceMaterial& material,
   const Vector3d& n_layer = n_coat.value_or(n);
   const double share =
       material.coat * (k_dielectric + (1 - k_dielectric) * schlick(std::abs(n_layer.dot(d_view))));
-  return (1 - share) * below + share * mirrored_by_coat(material, n_layer, d_view, room);
+  return (1 - share) * below + share * mirrored_by_coat(material, n_layer, d_view, light);
 }
 
 }  // namespace limn::sim

@@ -37,6 +37,10 @@ Eigen::Vector3d turned_to_viewer(const Eigen::Vector3d& n, const Eigen::Vector3d
   return n.dot(d) > 0 ? Eigen::Vector3d((n - n.dot(d) * d).normalized()) : n;
 }
 
+std::shared_ptr<const RoomImageSizes> image_sizes_of(const scene::Scene& scene) {
+  return scene.room_image ? std::make_shared<RoomImageSizes>(*scene.room_image) : nullptr;
+}
+
 }  // namespace
 
 ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene& parts, const Imager& viewer)
@@ -45,7 +49,11 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
       p_viewer_(viewer.imager_from_world.inverse().translation),
       light_(PartsLight::beside(viewer)) {
   LIMN_CHECK(world.scene.has_value());
-  if (const auto& room = parts.light ? parts.light : world.scene->light) light_ = {*room, true};
+  if (const auto& room = parts.light ? parts.light : world.scene->light)
+    light_ = {*room, image_sizes_of(*world.scene), true};
+  finish_ = find_named(world.scene->finishes, parts.finish);
+  if (const Object* prototype = world.find("prototype"))
+    prototype_from_world_ = prototype->world_from_object.inverse();
   for (const scene::PosedPart& posed : parts.parts) {
     const scene::Slot* slot = world.scene->find_slot(posed.slot);
     LIMN_CHECK(slot != nullptr);
@@ -148,7 +156,9 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
   const auto turned = [&](const Eigen::Vector3d& along) {
     return turned_to_viewer(side * part.rays.mapped_normal(nearest.hit, along), d);
   };
-  return shaded(material, turned(material.along), -d, light.room, turned(material.coat_along)).cast<float>();
+  return shaded(material, turned(material.along), -d, light.room, turned(material.coat_along),
+                light.image_sizes.get())
+      .cast<float>();
 }
 
 // If no room light is known, the light comes along the prototype's normal and nothing is reflected
@@ -164,7 +174,8 @@ Eigen::Vector3f ReferenceRenderer::radiance_on_surface(const Nearest& nearest,
   };
   const Eigen::Vector3d n = turned(material.along);
   if (light_.is_room_light)
-    return shaded(material, n, d_normal, light_.room, turned(material.coat_along)).cast<float>();
+    return shaded(material, n, d_normal, light_.room, turned(material.coat_along), light_.image_sizes.get())
+        .cast<float>();
   const Eigen::Vector3d light = material.occlusion * light_.room.above_rgb.reverse() +
                                 n.dot(d_normal) * light_.room.lamps[0].strength_rgb.reverse();
   return (material.base.cwiseProduct(light) + material.emitted).cast<float>();
@@ -202,6 +213,51 @@ ReferenceRenderer::Sample ReferenceRenderer::surface_sample(const Eigen::Vector3
   return {best.part, radiance_on_surface(best, n)};
 }
 
+// The finish's material at a point of the prototype, in the world.
+SurfaceMaterial ReferenceRenderer::finish_at(const Hit& hit, const Eigen::Vector3d& p) const {
+  SurfaceMaterial material;
+  material.base = finish_->base_colour.reverse();
+  material.metallic = finish_->metallic;
+  material.roughness = finish_->roughness;
+  material.is_diffuse = finish_->metallic == 0 && finish_->roughness == 1;
+  material.emitted.setZero();
+  material.coat = finish_->clearcoat;
+  material.coat_roughness = finish_->clearcoat_roughness;
+  if (!finish_->image) return material;
+  Eigen::Vector2f uv = prototype_.uv(hit);
+  if (const auto& projection = finish_->image->projection) {
+    const Eigen::Vector3d p_image = projection->prototype_from_image.inverse() * (prototype_from_world_ * p);
+    uv = (p_image.head<2>().cwiseQuotient(projection->size_m).array() + 0.5).matrix().cast<float>();
+  }
+  const bool is_inside = uv.minCoeff() >= 0 && uv.maxCoeff() <= 1;
+  if (!is_inside && !finish_->image->repeats) return material;
+  const Eigen::Vector4d over = repeated_texture(finish_->image->texture.image, uv).cast<double>();
+  material.base = (1 - over.w()) * material.base + over.w() * over.head<3>();
+  return material;
+}
+
+// The finish where a ray meets the prototype, as seen from p_eye if it is for a viewer.
+ReferenceRenderer::Sample ReferenceRenderer::finish_sample(const Hit& hit,
+                                                           const Ray& ray,
+                                                           const Eigen::Vector3d& p_eye,
+                                                           const PartsLight& light) const {
+  if (finish_ == nullptr || hit.object < 0) return {};
+  const Eigen::Vector3d p = ray.p_origin + hit.distance * ray.d, d = (p - p_eye).normalized();
+  const Eigen::Vector3d n_face = turned_against(prototype_.face_normal(hit), ray.d);
+  const Eigen::Vector3d n = turned_against(prototype_.shading_normal(hit), -n_face);
+  const SurfaceMaterial material = finish_at(hit, p);
+  const int part = static_cast<int>(parts_.size());
+  if (finish_->for_viewer && n_face.dot(d) < 0)
+    return {
+        part,
+        shaded(material, turned_to_viewer(n, d), -d, light.room, {}, light.image_sizes.get()).cast<float>()};
+  if (light.is_room_light)
+    return {part, shaded(material, n, n, light.room, {}, light.image_sizes.get()).cast<float>()};
+  const Eigen::Vector3d from_front =
+      light.room.above_rgb.reverse() + light.room.lamps[0].strength_rgb.reverse();
+  return {part, material.base.cwiseProduct(from_front).cast<float>()};
+}
+
 ReferenceRenderer::Sample ReferenceRenderer::light_along(const Ray& ray) const {
   const Hit hit = prototype_.first_hit(ray);
   if (hit.object < 0) return {};
@@ -209,12 +265,15 @@ ReferenceRenderer::Sample ReferenceRenderer::light_along(const Ray& ray) const {
   const Eigen::Vector3d n_face = turned_against(prototype_.face_normal(hit), ray.d);
   const Sample view = view_sample(p, n_face);
   if (view.part >= 0) return view;
-  return surface_sample(p, turned_against(prototype_.shading_normal(hit), -n_face));
+  const Sample on_surface = surface_sample(p, turned_against(prototype_.shading_normal(hit), -n_face));
+  return on_surface.part >= 0 ? on_surface : finish_sample(hit, ray, p_viewer_, light_);
 }
 
 ReferenceRenderer::Sample ReferenceRenderer::parts_along(const Ray& ray, const PartsLight& light) const {
   const Nearest nearest = nearest_part(ray);
-  if (nearest.part < 0 || is_hidden(nearest, ray, prototype_.first_hit(ray))) return {};
+  const Hit prototype = prototype_.first_hit(ray);
+  if (nearest.part < 0 || is_hidden(nearest, ray, prototype))
+    return finish_sample(prototype, ray, ray.p_origin, light);
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
   if (part.on_surface)
     return {nearest.part, radiance_on_surface(nearest, part.rays.shading_normal(nearest.hit))};

@@ -39,11 +39,11 @@ class ReferenceRenderer {
 
   /// The light that projector `index` should give if it were the only one. For each point that a pixel
   /// lights: the colour of the view part that the viewer sees in front of it, else that of the surface part
-  /// within 2 mm of it.
+  /// within 2 mm of it, else that of the prototype's finish.
   PartImage projector_image(std::size_t index) const;
 
-  /// The parts as an imager sees them, without those that the prototype hides. If no room light is known, the
-  /// lamp moves with the imager.
+  /// The parts as an imager sees them, without those that the prototype hides, over the prototype's finish.
+  /// If no room light is known, the lamp moves with the imager.
   PartImage parts_image(const Imager& imager) const;
 
   DepthOrder depth_order(const Imager& imager) const;
@@ -65,6 +65,11 @@ class ReferenceRenderer {
   template <class SampleAt>
   static PartImage averaged(const Imager& imager, const SampleAt& sample_at);
 
+  SurfaceMaterial finish_at(const Hit& hit, const Eigen::Vector3d& p) const;
+  Sample finish_sample(const Hit& hit,
+                       const Ray& ray,
+                       const Eigen::Vector3d& p_eye,
+                       const PartsLight& light) const;
   static SurfaceMaterial material_at(const Part& part, const Hit& hit);
   Nearest nearest_part(const Ray& ray) const;
   bool is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const;
@@ -80,6 +85,8 @@ class ReferenceRenderer {
   const World& world_;
   RayScene prototype_;
   std::vector<Part> parts_;
+  const scene::Finish* finish_ = nullptr;  // null: none
+  Pose prototype_from_world_;
   Eigen::Vector3d p_viewer_;
   PartsLight light_;
 };

@@ -74,6 +74,14 @@ Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool
                static_cast<int>(std::floor((1 - uv.y()) * static_cast<float>(texture.rows))));
 }
 
+Eigen::Vector4f repeated_texture(const cv::Mat& texture, const Eigen::Vector2f& uv) {
+  const float alpha = texture.channels() == 4 ? between_texels(texture, uv, alpha_of_texel) : 1;
+  Eigen::Vector4f out;
+  out.head<3>() = between_texels(texture, uv, repeated_texel);
+  out.w() = alpha;
+  return out;
+}
+
 bool is_cut_out(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv) {
   const scene::Material& material = material_of(mesh, triangle);
   if (material.cut_below <= 0 || material.texture.channels() != 4) return false;

@@ -11,6 +11,9 @@ namespace limn::sim {
 /// `sharp` that of the nearest pixel. Outside, the border is repeated.
 Eigen::Vector3f textured(const cv::Mat& texture, const Eigen::Vector2f& uv, bool sharp);
 
+/// Linear BGR and alpha (0 … 1; 1 where the image has none) of a texture that repeats, interpolated.
+Eigen::Vector4f repeated_texture(const cv::Mat& texture, const Eigen::Vector2f& uv);
+
 /// Whether the material's alpha at a place of a triangle is below its cutoff.
 bool is_cut_out(const scene::Mesh& mesh, int triangle, const Eigen::Vector2f& uv);
 

@@ -124,7 +124,7 @@ SlotPlace read_slot(const ConfigNode& node, const scene::Slot& slot, const Pose&
 
 // The poses as in the world, except those that the file gives.
 scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
-  node.only({"world_from_prototype", "slots", "shown"});
+  node.only({"world_from_prototype", "slots", "shown", "finish"});
   const scene::Scene& scene = *world->scene;
   if (const auto pose = node.find("world_from_prototype")) sim::move_prototype(*world, pose->pose());
   std::vector<std::string> variants(scene.slots.size());
@@ -147,6 +147,7 @@ scene::PosedScene read_poses(const ConfigNode& node, sim::World* world) {
   }
   const scene::PosedScene standing = sim::true_poses(*world, variants);
   scene::PosedScene posed{world->world_from_prototype, {}, standing.viewpoints};
+  if (const auto finish = node.find("finish")) posed.finish = finish->choice(scene::finish_names(scene));
   for (std::size_t i = 0; i < scene.slots.size(); ++i) {
     const scene::Slot& slot = scene.slots[i];
     if (!shown.contains(slot.name)) continue;

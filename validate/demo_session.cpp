@@ -20,6 +20,7 @@
 #include "tracker/body_estimate.h"
 #include "tracker/detector.h"
 #include "tracker/marker_image.h"
+#include "validate/demo_painting.h"
 #include "validate/light_chain.h"
 #include "validate/metrics.h"
 #include "wizard/capture/capture_plan.h"
@@ -403,6 +404,9 @@ Result<std::vector<DemoImage>> session_images(DemoSession* session,
   demo_images.push_back({"mask", "Mask",
                          "From the designer's viewpoint: white is projected, grey is left to the screen.",
                          merged_masks(renderer.coverage(posed, viewer), {viewer.width, viewer.height})});
+  LIMN_TRY(std::vector<DemoImage> painted,
+           painted_images({&session->scene, &session->rig, &room->world(), posed}));
+  for (DemoImage& image : painted) demo_images.push_back(std::move(image));
   return demo_images;
 }
 

@@ -27,7 +27,9 @@ std::pair<cv::Mat, cv::Mat> bounds_of_light(CheckRun& run) {
     alone.copyTo(high, candidate & ~begun);
     begun |= candidate;
   }
-  return {low, high};
+  // Full light is the most that a projector alone can be asked for, so a brighter highlight may be cut off
+  // there.
+  return {cv::min(low, cv::Scalar::all(1)), high};
 }
 
 }  // namespace

@@ -6,7 +6,9 @@
 #include <vector>
 
 #include "core/file.h"
+#include "core/names.h"
 #include "device/jpeg.h"
+#include "remote/api/painted_mesh.h"
 #include "remote/api/responses.h"
 #include "scene/glb.h"
 #include "scene/kept_files.h"
@@ -24,10 +26,14 @@ std::optional<std::string> name_in(const std::string& path, std::string_view beg
   return decoded(std::string_view(path).substr(begin.size(), path.size() - begin.size() - end.size()));
 }
 
-// A look's parts on the prototype as a glTF file; empty: the look has no parts and there is no prototype.
+// A look's parts on the prototype, in its finish, as a glTF file; empty: the look has no parts and there is
+// no prototype.
 std::string look_assembly(const scene::Scene& scene, const scene::Look& look) {
   std::vector<scene::GlbNode> nodes;
-  if (scene.prototype) nodes.push_back({"prototype", &scene.prototype->mesh, Pose()});
+  const scene::Finish* finish = find_named(scene.finishes, look.finish);
+  const scene::Mesh painted =
+      scene.prototype && finish ? painted_mesh(scene.prototype->mesh, *finish) : scene::Mesh{};
+  if (scene.prototype) nodes.push_back({"prototype", finish ? &painted : &scene.prototype->mesh, Pose()});
   for (const scene::Look::Part& part : look.parts) {
     const scene::Slot* slot = scene.find_slot(part.slot);
     if (!slot) continue;

@@ -94,6 +94,8 @@ SessionState session_state(const session::Session& session,
   out.split_mm = show_state.split_mm;
   out.screen = scene::screen_names()[static_cast<std::size_t>(show_state.screen)];
   out.outputs = show_state.screens;
+  out.finishes = scene::finish_names(scene);
+  out.finish = show_state.finish;
   out.light = light_text(scene, show_state);
   out.viewer = show_state.viewer;
   out.follows = session.composed().follows;
@@ -138,6 +140,8 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["marker_states"] = state.marker_states;
   out["split"] = state.split;
   out["split_mm"] = state.split_mm;
+  out["finishes"] = state.finishes;
+  out["finish"] = state.finish;
   out["light"] = state.light;
   out["screen"] = state.screen;
   out["screens"] = scene::screen_names();

@@ -2,7 +2,7 @@
 import { role_of } from "/actions.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { draw_picture, fetch_picture } from "/pictures.js";
-import { make_shading } from "/shading.js";
+import { make_finish, make_shading } from "/shading.js";
 import { make_switch } from "/stage.js";
 
 const k_screens = {
@@ -176,7 +176,8 @@ export function make_light(session) {
   const split = make_split(session);
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
   const outputs = h("div", { class: "stack" });
-  const shading = make_shading(session);
+  const shading = make_shading(session),
+    finish = make_finish(session);
   const viewers = make_viewers(session);
   const projectors = make_projectors(session);
   by_id("light").append(
@@ -194,6 +195,7 @@ export function make_light(session) {
         screens,
         outputs,
       ),
+      finish,
       shading,
     ),
     h("h3", {}, "Projectors"),
@@ -202,7 +204,7 @@ export function make_light(session) {
   return {
     opened: (name) => projectors.opened(name),
     show(state) {
-      for (const part of [grid, rings, split, viewers, shading, projectors]) part.show(state);
+      for (const part of [grid, rings, split, viewers, finish, shading, projectors]) part.show(state);
       keep(
         screens,
         state.screens,

@@ -1,4 +1,4 @@
-// Material of parts and room light: sliders that act when they are released.
+// Material of parts, finish of the prototype, and room light: sliders that act when they are released.
 import { h } from "/dom.js";
 
 function slider(label, properties) {
@@ -47,6 +47,21 @@ export function make_material(session, slot) {
     session.button("material", { slot: slot.name, class: "wide" }, "Use the file's material"),
   );
   node.show = (state_of) => follow(state_of.material);
+  return node;
+}
+
+/** The choice of the whole prototype's finish; hidden in a scene without finishes. */
+export function make_finish(session) {
+  const choice = h("select", { "aria-label": "Finish of the prototype", "data-action": "finish" });
+  choice.addEventListener("change", () => session.act("finish", "", choice.value));
+  const node = h("div", { class: "stack", "data-needs": "work", hidden: true }, h("h3", {}, "Finish"), choice);
+  node.show = ({ finishes = [], finish = "" }) => {
+    node.hidden = finishes.length === 0;
+    const names = ["", ...finishes];
+    if (names.join("\n") !== [...choice.options].map(({ value }) => value).join("\n"))
+      choice.replaceChildren(...names.map((name) => h("option", { value: name }, name || "Bare prototype")));
+    if (choice.value !== finish) choice.value = finish;
+  };
   return node;
 }
 

@@ -113,7 +113,7 @@ const std::map<std::string, Names>& guests() {
       {"lo/", {"exchange/poses"}},
       {"pugixml", {"core", "scene", "exchange"}},
       {"yaml-cpp/", {"core"}},
-      {"OpenEXR/", {"exchange"}},
+      {"OpenEXR/", {"scene/files", "exchange"}},
       {"cairo", {"exchange/printing"}},
       {"opencv2/calib3d", {"calib"}},
       {"opencv2/aruco", {"core"}},

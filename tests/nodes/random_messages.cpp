@@ -60,11 +60,11 @@ void fields(F& f, scene::RoomLight::Lamp& x) {
 }
 template <class F>
 void fields(F& f, scene::RoomLight& x) {
-  f(x.d_up_world), f(x.below_rgb), f(x.above_rgb), f(x.lamps);
+  f(x.d_up_world), f(x.below_rgb), f(x.above_rgb), f(x.lamps), f(x.image_strength);
 }
 template <class F>
 void fields(F& f, scene::PosedScene& x) {
-  f(x.world_from_prototype), f(x.parts), f(x.viewpoints), f(x.light);
+  f(x.world_from_prototype), f(x.parts), f(x.viewpoints), f(x.light), f(x.finish);
 }
 template <class F>
 void fields(F& f, session::FadingPart& x) {

@@ -23,6 +23,8 @@ Scene a_scene() {
     for (const char* variant : {"a", "b", "c"}) slot.variants.push_back({variant, {}});
     scene.slots.push_back(slot);
   }
+  scene.finishes.emplace_back();
+  scene.finishes[0].name = "sand";
   scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{LengthUnit::metre}});
   return scene;
 }
@@ -54,7 +56,7 @@ std::string text_of(const Pose& pose) {
 // All members of a show state, as text. A new member causes a compiler error until it is added here, too.
 std::map<std::string, std::string> members_of(const ShowState& show_state) {
   const auto& [slots, looks, look, other_look, deleted_look, blackout, frozen, marker_states, grid, split,
-               split_mm, screen, screens, light, d_up_world, d_front_world, viewer] = show_state;
+               split_mm, screen, screens, light, finish, d_up_world, d_front_world, viewer] = show_state;
   std::map<std::string, std::string> all = {
       {"look", look},
       {"other_look", other_look},
@@ -69,6 +71,7 @@ std::map<std::string, std::string> members_of(const ShowState& show_state) {
       {"light", light ? look_json({"light", {}, light}) : ""},
       {"d_up_world", text_of(Pose(Eigen::Quaterniond::Identity(), d_up_world))},
       {"d_front_world", text_of(Pose(Eigen::Quaterniond::Identity(), d_front_world))},
+      {"finish", finish},
       {"viewer", viewer}};
   for (const Look& each : looks) all["looks"] += look_json(each);
   for (const Output& each : screens)
@@ -155,6 +158,8 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
       return Case{usual, "#ffffff 0 0.4", {"slots[0].material"}, [](const ShowState& s) {
                     return s.slots[0].material == MaterialOverride{Eigen::Vector3d(1, 1, 1), 0, 0.4};
                   }};
+    case ActionId::finish:
+      return Case{usual, "sand", {"finish"}, [](const ShowState& s) { return s.finish == "sand"; }};
     case ActionId::save_look:
       return Case{usual, "new", {"looks", "look", "other_look"}, [](const ShowState& s) {
                     return s.looks.size() == 4 && s.looks[3].name == "new" && s.look == "new" &&

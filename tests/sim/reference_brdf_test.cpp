@@ -66,6 +66,24 @@ TEST(ReferenceBrdf, InEvenLightNoMetalIsBrighterThanItAndASmoothOneIsAsBright) {
     }
 }
 
+TEST(ReferenceBrdf, AnEvenPictureOfTheRoomIsEvenSoftLight) {
+  scene::RoomImage image;
+  image.light = cv::Mat(8, 16, CV_32FC3, cv::Scalar::all(0.25));
+  const RoomImageSizes sizes(image);
+  scene::RoomLight room;
+  room.image_strength = 2;
+  for (const auto& [metallic, roughness] : {std::pair(0.0, 0.3), {0.5, 0.6}, {1.0, 1.0}}) {
+    SurfaceMaterial lacquer = material({0.2, 0.4, 0.8}, metallic, roughness);
+    lacquer.coat = 1;
+    lacquer.coat_roughness = 0.2;
+    EXPECT_TRUE(test::near(shaded(lacquer, k_up, tilted(50), room, {}, &sizes),
+                           shaded(lacquer, k_up, tilted(50), even_light(0.5)), 3e-3));
+  }
+  EXPECT_TRUE(
+      test::near(shaded(material({1, 1, 1}, 0, 0.5), k_up, k_up, room), Vector3d::Zero().eval(), 1e-12))
+      << "a scene without a picture";
+}
+
 // The reflected soft light as a sum over directions of the hemisphere, without half vectors.
 Vector3d mirrored_by_rings(const SurfaceMaterial& s,
                            const Vector3d& n,

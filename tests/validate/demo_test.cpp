@@ -39,8 +39,8 @@ TEST(Demo, LandsTheLightWhereItIsAimedAndSaysSo) {
 
   const std::string page = read_file(folder / "demo.html").value();
   EXPECT_EQ(page.find("src=\"http"), std::string::npos) << "the page needs no other file";
-  for (const char* name :
-       {"unlit", "lit", "projector0", "projector1", "composite", "error-map", "composite-swapped"}) {
+  for (const char* name : {"unlit", "lit", "projector0", "projector1", "composite", "error-map",
+                           "composite-swapped", "dim", "painted"}) {
     EXPECT_TRUE(read_image(folder / (std::string(name) + ".png"))) << name;
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "demo-captures"));

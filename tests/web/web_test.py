@@ -286,6 +286,21 @@ class Checks:
         wait_for("the light's own", lambda: values("#light") == ["30", "45", "0.6", "0.3", "0.1"])
 
     @check
+    def the_prototype_is_painted(self):
+        self.tab("light")
+        shown = lambda: self.browser.script("return document.querySelector('[data-action=finish]').value")
+        expect(shown() == "", "a bare prototype", shown())
+        self.browser.script("""
+            const choice = document.querySelector("[data-action=finish]");
+            choice.value = "matt sand";
+            choice.dispatchEvent(new Event("change"));""")
+        wait_for("the paint", lambda: self.state()["finish"] == "matt sand")
+        self.edit("finish", "", "blue lacquer")
+        wait_for("another paint", lambda: shown() == "blue lacquer")
+        self.edit("finish", "", "")
+        wait_for("no paint", lambda: shown() == "")
+
+    @check
     def each_of_several_screens_has_its_choice(self):
         self.tab("light")
         shown = self.browser.script_async("""
