@@ -206,10 +206,15 @@ Status repair(Change* change, std::monostate) {
 Status set_light(Change* change, const std::optional<LightNumbers>& numbers) {
   ShowState& show_state = change->show_state;
   const std::optional<RoomLight>& own = change->scene.light;
-  show_state.light.reset();
-  if (numbers)
-    show_state.light =
-        parse_room_light(*numbers, own ? own->d_up_world : show_state.d_up_world, show_state.d_front_world);
+  if (!numbers) {
+    show_state.light.reset();
+    return {};
+  }
+  RoomLight light =
+      parse_room_light(*numbers, own ? own->d_up_world : show_state.d_up_world, show_state.d_front_world);
+  if (const auto& before = show_state.light ? show_state.light : own)
+    light.image_strength = before->image_strength;  // the numbers say nothing about the picture of the room
+  show_state.light = std::move(light);
   return {};
 }
 

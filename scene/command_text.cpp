@@ -42,8 +42,8 @@ std::string format_material_override(const MaterialOverride& change) {
 }
 
 std::optional<LightNumbers> room_light_numbers(const RoomLight& light, const Eigen::Vector3d& d_front_world) {
-  if (light.image_strength != 0 || light.lamps.size() != 1 || !is_white(light.lamps[0].strength_rgb) ||
-      !is_white(light.above_rgb) || !is_white(light.below_rgb))
+  if (light.lamps.size() != 1 || !is_white(light.lamps[0].strength_rgb) || !is_white(light.above_rgb) ||
+      !is_white(light.below_rgb))
     return std::nullopt;
   // The directions of a lamp in front and of one 90 degrees to the right of it.
   const auto lamp_at = [&](const LightNumbers& numbers) {

@@ -22,16 +22,17 @@ FinishImage read_finish_image(const ConfigNode& node) {
   FinishImage image;
   image.texture.file = node.at("file").path_inside().string();
   if (const auto repeats = node.find("repeats")) image.repeats = repeats->boolean();
-  const auto size = node.find("size_mm"), pose = node.find("prototype_from_image");
-  if (!size && !pose) return image;
+  const auto pose = node.find("prototype_from_image");
+  if (!pose && !node.find("size_mm")) return image;
   FinishImage::Projection projection;
   if (pose) projection.prototype_from_image = pose->pose();
-  const auto sides = node.at("size_mm").items();
+  const ConfigNode size = node.at("size_mm");
+  const auto sides = size.items();
   if (sides.size() == 2)
     projection.size_m =
         1e-3 * Eigen::Vector2d(sides[0].positive(k_largest_image_mm), sides[1].positive(k_largest_image_mm));
   else
-    size->problem(fmt::format("expected width and height in mm, found {} numbers.", sides.size()));
+    size.problem(fmt::format("expected width and height in mm, found {} numbers.", sides.size()));
   image.projection = projection;
   return image;
 }

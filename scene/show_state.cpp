@@ -101,7 +101,9 @@ ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) 
     }
   }
   show_state.light = look.light;
-  show_state.finish = look.finish;
+  const bool has_finish =
+      find_named(scene.finishes, look.finish) != nullptr;  // it may have been removed since
+  show_state.finish = has_finish ? look.finish : "";
   remember_look(look.name, &show_state);
   return show_state;
 }

@@ -271,6 +271,7 @@ ReferenceRenderer::Sample ReferenceRenderer::light_along(const Ray& ray) const {
 
 ReferenceRenderer::Sample ReferenceRenderer::parts_along(const Ray& ray, const PartsLight& light) const {
   const Nearest nearest = nearest_part(ray);
+  if (nearest.part < 0 && finish_ == nullptr) return {};
   const Hit prototype = prototype_.first_hit(ray);
   if (nearest.part < 0 || is_hidden(nearest, ray, prototype))
     return finish_sample(prototype, ray, ray.p_origin, light);

@@ -182,6 +182,11 @@ Result<cv::Mat> decode_exr(std::string_view bytes, const std::string& name) {
     Imf::Header::setMaxTileSize(k_most_width, k_most_height);
     ExrBytes stream(bytes, name);
     Imf::RgbaInputFile file(stream);
+    if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_Y)) == 0)
+      return error(
+          "{}: expected an OpenEXR image with channels R, G and B, found others. Export it as a plain image, "
+          "without layers.",
+          name);
     const Imath::Box2i window = file.dataWindow();
     const long width = static_cast<long>(window.max.x) - window.min.x + 1,
                height = static_cast<long>(window.max.y) - window.min.y + 1;

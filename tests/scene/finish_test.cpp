@@ -82,6 +82,7 @@ TEST(Finish, WhatIsWrongIsNamed) {
   expect(message([](json* s) { (*s)["finishes"][0]["gloss"] = 1; }), "gloss");
   expect(message([](json* s) { (*s)["finishes"][0]["image"]["file"] = "none.png"; }), "none.png");
   expect(message([](json* s) { (*s)["finishes"][0]["image"]["size_mm"] = {1}; }), "width and height in mm");
+  expect(message([](json* s) { (*s)["finishes"][0]["image"].erase("size_mm"); }), "size_mm");
   expect(message([](json* s) { s->erase("prototype"); }), "expected a prototype to paint");
   // Without a projection the image needs the mesh's texture coordinates.
   expect(message([](json* s) {
@@ -110,6 +111,9 @@ TEST(Finish, IsChosenByAnActionAndKeptByLooks) {
                        compose_scene(*scene, with_look(*scene, state, state.looks[0]), {})));
   EXPECT_EQ(done("restore_look", "evening"), "");
   EXPECT_EQ(state.finish, "lacquer");
+  Scene without = *scene;
+  without.finishes.clear();
+  EXPECT_EQ(with_look(without, state, state.looks[0]).finish, "");
   const fs::path file = scene->folder / "evening.json";
   ASSERT_TRUE(write_file(file, look_json(state.looks[0])));
   const auto look = load_look(file, *scene);
@@ -118,6 +122,17 @@ TEST(Finish, IsChosenByAnActionAndKeptByLooks) {
   ASSERT_TRUE(write_file(file, R"({"schema": "limn.look/1", "name": "a", "slots": {}, "finish": "gold"})"));
   const auto unknown = load_look(file, *scene);
   EXPECT_NE(unknown.message().find("gold"), std::string::npos);
+}
+
+TEST(RoomLight, TheActionLightKeepsThePictureOfTheRoom) {
+  Scene scene;
+  scene.light = RoomLight{};
+  scene.light->image_strength = 0.5;
+  ShowState state = initial_show_state(scene);
+  const auto after =
+      apply_edit(scene, state, compose_scene(scene, state, {}), Edit{"light", "", "30 45 0.6 0.3 0.1"});
+  ASSERT_TRUE(after) << after.message();
+  EXPECT_EQ(after->light->image_strength, 0.5);
 }
 
 }  // namespace
