@@ -202,7 +202,7 @@ double diagonal_mm(const std::vector<Leaf>& leaves) {
 // Small models are cut more finely than asked for, so that their boxes hold, too. Not where a large chord
 // error is asked for, to have fewer triangles.
 Tessellation for_size(const std::vector<Leaf>& leaves, Tessellation how) {
-  constexpr double k_share = 2e-4;  // of the diagonal
+  constexpr double k_share = 2e-4;  // share of the diagonal
   if (how.chord_mm > Tessellation().chord_mm) return how;
   if (const double diagonal = diagonal_mm(leaves); diagonal > 0)
     how.chord_mm = std::min(how.chord_mm, k_share * diagonal);

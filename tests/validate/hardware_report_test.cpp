@@ -85,11 +85,15 @@ Outcome run_report(const ReportOptions& options,
       .code = done ? 0 : 1, .out = testing::internal::GetCapturedStdout(), .err = done ? "" : done.message()};
 }
 
-// Presses Ctrl-C when this file appears.
-std::jthread interrupting_at(const fs::path& file) {
-  return std::jthread([file] {
-    for (int i = 0; i < 6000 && !fs::exists(file); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+// Presses Ctrl-C when this file is there and has this text.
+std::jthread interrupting_at(const fs::path& file, const std::string& text = "") {
+  return std::jthread([file, text] {
+    const auto is_there = [&] {
+      if (!fs::exists(file)) return false;
+      const auto found = read_file(file);
+      return found && found->find(text) != std::string::npos;
+    };
+    for (int i = 0; i < 6000 && !is_there(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(5));
     std::raise(SIGINT);
   });
 }
@@ -101,7 +105,7 @@ void expect_state(const json& report, const std::string& step, const std::string
 // Interrupts a report in the step frames, and in the second placement of the board.
 void expect_interruptions(const ReportOptions& options) {
   {
-    const std::jthread person = interrupting_at(options.folder / "report.json");
+    const std::jthread person = interrupting_at(options.folder / "report.json", "\"done\"");
     const Outcome ended = run_report(options);
     EXPECT_EQ(ended.code, 1);
     expect_contains(ended.err, "interrupted in the step frames. What was measured is kept; the same command");
