@@ -50,7 +50,7 @@ Vector3d soft_from(const Light& light, const Vector3d& d, double solid_angle) {
   const scene::RoomLight& room = light.room;
   const double height = std::clamp(d.dot(room.d_up_world) / k_horizon_height, -1.0, 1.0);
   const double above = 0.5 + 0.75 * height - 0.25 * height * height * height;
-  const Vector3d soft = bgr(room.below_rgb + above * (room.above_rgb - room.below_rgb));
+  Vector3d soft = bgr(room.below_rgb + above * (room.above_rgb - room.below_rgb));
   return light.has_image() ? Vector3d(soft + room.image_strength * light.image_sizes->from(d, solid_angle))
                            : soft;
 }
@@ -58,7 +58,7 @@ Vector3d soft_from(const Light& light, const Vector3d& d, double solid_angle) {
 // All soft light reflected by a white diffuse surface.
 Vector3d soft_on(const Light& light, const Vector3d& n) {
   const double above = (1 + n.dot(light.room.d_up_world)) / 2;
-  const Vector3d soft = bgr((1 - above) * light.room.below_rgb + above * light.room.above_rgb);
+  Vector3d soft = bgr((1 - above) * light.room.below_rgb + above * light.room.above_rgb);
   if (!light.has_image()) return soft;
   const Vector3d d_u = n.unitOrthogonal(), d_v = n.cross(d_u);
   Vector3d sum = Vector3d::Zero();
@@ -229,7 +229,7 @@ Vector3d shaded(const SurfaceMaterial& material,
     }
     by_lamps += nl * reflected.cwiseProduct(bgr(lamp.strength_rgb));
   }
-  const Vector3d below = material.occlusion * soft + by_lamps + material.emitted;
+  Vector3d below = material.occlusion * soft + by_lamps + material.emitted;
   if (material.coat <= 0) return below;
   // The layer's share of mirrored light is that of glass at the angle of the view; it darkens what is below.
   const Vector3d& n_layer = n_coat.value_or(n);

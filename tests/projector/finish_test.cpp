@@ -66,7 +66,7 @@ std::vector<scene::Finish> finishes() {
   decal.for_viewer = false;
   decal.image.emplace();
   decal.image->texture.image = stripes(true);
-  decal.image->projection.emplace();
+  decal.image->projection = scene::FinishImage::Projection();
   // Turned about the panel's normal, and looked at from -z: y is down in the room and up in the image.
   decal.image->projection->prototype_from_image =
       Pose(exp_rotation({0, 0, 0.4}) * exp_rotation({M_PI, 0, 0}), {0.03, -0.02, 0});
