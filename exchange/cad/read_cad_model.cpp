@@ -40,8 +40,11 @@ Eigen::Matrix4d matrix_of(const gp_Trsf& placed) {
   return m;
 }
 
-XCAFPrs_IndexedDataMapOfShapeStyle styles_inside(const Leaf& leaf) {
-  XCAFPrs_IndexedDataMapOfShapeStyle styles;
+using Styles = XCAFPrs_IndexedDataMapOfShapeStyle;
+
+// The styles of the shapes inside a product.
+Styles styles_inside(const Leaf& leaf) {
+  Styles styles;
   XCAFPrs::CollectStyleSettings(leaf.product, TopLoc_Location(), styles);
   return styles;
 }
@@ -49,11 +52,10 @@ XCAFPrs_IndexedDataMapOfShapeStyle styles_inside(const Leaf& leaf) {
 // The colours of a product's faces.
 class FaceColours {
  public:
-  explicit FaceColours(const Leaf& leaf) : leaf_(leaf) {
+  FaceColours(const Leaf& leaf, const Styles& styles) : leaf_(leaf) {
     if (leaf.whole) return;
-    const XCAFPrs_IndexedDataMapOfShapeStyle styles = styles_inside(leaf);
     for (int type = TopAbs_FACE; type >= TopAbs_COMPOUND; --type)  // a face's own colour comes first
-      for (XCAFPrs_IndexedDataMapOfShapeStyle::Iterator at(styles); at.More(); at.Next())
+      for (Styles::Iterator at(styles); at.More(); at.Next())
         if (at.Key().ShapeType() == type && at.Value().IsSetColorSurf()) bind(at.Key(), at.Value());
   }
 
@@ -78,11 +80,10 @@ struct Body {
   std::string name;
 };
 
-// The shapes inside a product that the file hides.
-TopTools_MapOfShape hidden_inside(const Leaf& leaf) {
+// The shapes that the file hides.
+TopTools_MapOfShape hidden_of(const Styles& styles) {
   TopTools_MapOfShape hidden;
-  const XCAFPrs_IndexedDataMapOfShapeStyle styles = styles_inside(leaf);
-  for (XCAFPrs_IndexedDataMapOfShapeStyle::Iterator at(styles); at.More(); at.Next())
+  for (Styles::Iterator at(styles); at.More(); at.Next())
     if (!at.Value().IsVisible()) hidden.Add(at.Key());
   return hidden;
 }
@@ -90,7 +91,8 @@ TopTools_MapOfShape hidden_inside(const Leaf& leaf) {
 // The bodies of a product.
 class Bodies {
  public:
-  Bodies(const Leaf& leaf, const ShapeNames& names) : names_(names), hidden_(hidden_inside(leaf)) {
+  Bodies(const Leaf& leaf, const Styles& styles, const ShapeNames& names)
+      : names_(names), hidden_(hidden_of(styles)) {
     const TopoDS_Shape product = XCAFDoc_ShapeTool::GetShape(leaf.product);
     if (product.IsNull()) return;
     BRep_Builder().MakeCompound(rest_);
@@ -161,7 +163,7 @@ Joined joined(const std::vector<std::pair<TopoDS_Shape, Colour>>& faces, double 
 
 // The faces of a product at a place, with their colours.
 void add_faces(const Leaf& leaf, const gp_Trsf& placed, std::vector<std::pair<TopoDS_Shape, Colour>>* faces) {
-  const FaceColours colours(leaf);
+  const FaceColours colours(leaf, styles_inside(leaf));
   TopExp_Explorer at(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_FACE);
   for (; at.More(); at.Next())
     faces->emplace_back(at.Current().Moved(TopLoc_Location(placed)), colours(TopoDS::Face(at.Current())));
@@ -288,8 +290,9 @@ class Builder {
     Named named;
     const bool has_solid = TopExp_Explorer(XCAFDoc_ShapeTool::GetShape(leaf.product), TopAbs_SOLID).More();
     if (document_.format == "IGES" && !has_solid) return cut_group(leaf);
-    const FaceColours colours(leaf);
-    const Bodies bodies(leaf, document_.shape_names);
+    const Styles styles = styles_inside(leaf);
+    const FaceColours colours(leaf, styles);
+    const Bodies bodies(leaf, styles, document_.shape_names);
     hidden_ += bodies.hidden();
     for (const Body& body : bodies.all())
       if (const auto mesh = cut_body(body, [&](const TopoDS_Face& face) { return colours(face); }))

@@ -1,14 +1,10 @@
 // Clear layers and second texture coordinates, against the ray tracer.
 #include <cmath>
-#include <memory>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "projector/composite_policy.h"
 #include "scene/tangents.h"
-#include "sim/reference_renderer.h"
 #include "tests/projector/judged_image.h"
-#include "tests/projector/sheet_room.h"
 #include "tests/support/matchers.h"
 
 namespace limn::projector {
@@ -86,44 +82,22 @@ Mesh lacquered(double z, double bow) {
   return mesh;
 }
 
-struct Room {
+JudgedRoom room_with(scene::Mode mode, Mesh part) {
   Rig rig = two_projectors();
-  scene::Scene scene;
-  PosedScene posed;
-  Imager viewer = viewer_from({-0.3, -0.3, -1.2});
-  sim::World world;
-};
-
-Room room_with(scene::Mode mode, Mesh part) {
-  Room room;
-  room.rig.projectors.pop_back();
-  room.scene = scene_of(sheet(0.5, 0.4), {slot("panel", mode, std::move(part))});
-  room.scene.light = scene::RoomLight{
+  rig.projectors.pop_back();
+  Scene scene = scene_of(sheet(0.5, 0.4), {slot("panel", mode, std::move(part))});
+  scene.light = scene::RoomLight{
       k_up, {0.05, 0.08, 0.1}, {0.3, 0.28, 0.25}, {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
-  room.posed = posed_at_origin(room.scene);
-  room.world.rig = room.rig;
-  room.world.scene = room.scene;
-  sim::Object prototype;
-  prototype.name = "prototype";
-  prototype.mesh = std::make_shared<Mesh>(room.scene.prototype->mesh);
-  room.world.objects = {prototype};
-  return room;
+  return judged_room(std::move(rig), std::move(scene));
 }
 
 TEST_F(CoatsTest, LightAndCompositesOfAClearLayerAreThoseOfTheRayTracer) {
   for (const scene::Mode mode : {scene::Mode::view, scene::Mode::surface}) {
     const bool on_surface = mode == scene::Mode::surface;
     SCOPED_TRACE(on_surface ? "surface" : "view");
-    const Room room = room_with(mode, on_surface ? lacquered(-0.0005, 0) : lacquered(-0.08, k_bow));
+    const JudgedRoom room = room_with(mode, on_surface ? lacquered(-0.0005, 0) : lacquered(-0.08, k_bow));
     Renderer drawing = renderer(room.scene, room.rig);
-    const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
-    const cv::Mat composite =
-        drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
-    const auto seen = agree(composite, judge.parts_image(room.rig.cameras[0]), 0, 15000);
-    EXPECT_TRUE(seen) << seen.message();
-    const auto lit =
-        agree(drawing.projector_image(0, room.posed, room.viewer), judge.projector_image(0), 2.2, 15000);
-    EXPECT_TRUE(lit) << lit.message();
+    expect_agreement(&drawing, room, 15000, 15000);
   }
 }
 
@@ -131,12 +105,11 @@ TEST_F(CoatsTest, LightAndCompositesOfAClearLayerAreThoseOfTheRayTracer) {
 TEST_F(CoatsTest, ATextureInCoordinatesThatAreMissingIsPlain) {
   Mesh part = lacquered(-0.08, k_bow);
   part.second_uvs.clear();
-  const Room room = room_with(scene::Mode::view, std::move(part));
+  const JudgedRoom room = room_with(scene::Mode::view, std::move(part));
   Renderer drawing = renderer(room.scene, room.rig);
   const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
-  const cv::Mat composite =
-      drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
-  const auto seen = agree(composite, judge.parts_image(room.rig.cameras[0]), 0, 15000);
+  const auto seen =
+      agree(composite_over_black(&drawing, room), judge.parts_image(room.rig.cameras[0]), 0, 15000);
   EXPECT_TRUE(seen) << seen.message();
 }
 
@@ -174,7 +147,7 @@ TEST_F(CoatsTest, EveryMapIsSeenInItsOwnCoordinates) {
   material.maps = {};
   material.coat = {.factor = 0.9F, .roughness = 0.8F};
   material.emitted = {0.03F, 0.03F, 0.03F};
-  Room room = room_with(scene::Mode::view, bare);
+  JudgedRoom room = room_with(scene::Mode::view, bare);
   std::vector<scene::Variant>& variants = room.scene.slots[0].variants;
   const auto halves = [](const Vector3d& left, const Vector3d& right, bool in_second) {
     return painted([&](double u, double) { return u < 0.5 ? left : right; }, in_second);
@@ -202,7 +175,7 @@ TEST_F(CoatsTest, EveryMapIsSeenInItsOwnCoordinates) {
   Renderer drawing = renderer(room.scene, room.rig);
   const auto composite = [&](const std::string& variant) {
     room.posed.parts[0].variant = variant;
-    return drawing.composite(0, cv::Mat::zeros(480, 640, CV_8UC1), room.posed, Composite::full);
+    return composite_over_black(&drawing, room);
   };
   // The part without its rim, left and right, and without what is near the middle of the map.
   cv::Mat on_part;

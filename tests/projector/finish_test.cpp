@@ -8,7 +8,6 @@
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "tests/projector/judged_image.h"
-#include "tests/projector/sheet_room.h"
 #include "tests/support/matchers.h"
 
 namespace limn::projector {
@@ -78,63 +77,42 @@ std::vector<scene::Finish> finishes() {
   return {lacquer, decal, cloth};
 }
 
-struct Room {
-  Rig rig = two_projectors();
-  scene::Scene scene;
-  PosedScene posed;
-  Imager viewer = viewer_from({-0.3, -0.3, -1.2});
-  sim::World world;
-};
-
 // The room's light, with or without a lamp of its own, and two parts on the panel.
-Room room_with(bool has_light) {
-  Room room;
-  room.rig.projectors.pop_back();
-  EXPECT_TRUE(scale_resolution(0.5, &room.rig));
+JudgedRoom room_with(bool has_light) {
+  Rig rig = two_projectors();
+  rig.projectors.pop_back();
+  EXPECT_TRUE(scale_resolution(0.5, &rig));
   Mesh badge = coloured(sheet(0.08, 0.08, -0.0003), {0.1F, 0.2F, 0.7F}, false),
        knob = sheet(0.06, 0.06, -0.06);
   knob.materials[0].base_colour = {0.2F, 0.6F, 0.2F};
-  room.scene = scene_of(bowed_panel(),
-                        {slot("badge", scene::Mode::surface, badge), slot("knob", scene::Mode::view, knob)});
-  room.scene.finishes = finishes();
+  Scene scene = scene_of(bowed_panel(),
+                         {slot("badge", scene::Mode::surface, badge), slot("knob", scene::Mode::view, knob)});
+  scene.finishes = finishes();
   if (has_light)
-    room.scene.light = scene::RoomLight{k_up,
-                                        {0.05, 0.08, 0.1},
-                                        {0.3, 0.28, 0.25},
-                                        {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
-  room.posed = posed_at_origin(room.scene);
+    scene.light = scene::RoomLight{k_up,
+                                   {0.05, 0.08, 0.1},
+                                   {0.3, 0.28, 0.25},
+                                   {{Vector3d(0.2, -0.5, -1).normalized(), {0.5, 0.45, 0.4}}}};
+  JudgedRoom room = judged_room(std::move(rig), std::move(scene));
   room.posed.parts[1].world_from_part.translation = {0.12, 0.06, 0};
-  room.world.rig = room.rig;
-  room.world.scene = room.scene;
-  sim::Object prototype;
-  prototype.name = "prototype";
-  prototype.mesh = std::make_shared<Mesh>(room.scene.prototype->mesh);
-  room.world.objects = {prototype};
   return room;
 }
 
 TEST_F(FinishTest, LightAndCompositesAreThoseOfTheRayTracer) {
   for (const bool has_light : {true, false}) {
-    Room room = room_with(has_light);
+    JudgedRoom room = room_with(has_light);
     Renderer drawing = renderer(room.scene, room.rig);
     for (const scene::Finish& finish : room.scene.finishes) {
       if (!has_light && finish.is_diffuse()) continue;  // as in a room's light
       SCOPED_TRACE(finish.name + (has_light ? " in a room's light" : " without a room's light"));
       room.posed.finish = finish.name;
-      const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
-      const cv::Mat composite =
-          drawing.composite(0, cv::Mat::zeros(240, 320, CV_8UC1), room.posed, Composite::full);
-      const auto seen = agree(composite, judge.parts_image(room.rig.cameras[0]), 0, 20000);
-      EXPECT_TRUE(seen) << seen.message();
-      const auto lit =
-          agree(drawing.projector_image(0, room.posed, room.viewer), judge.projector_image(0), 2.2, 15000);
-      EXPECT_TRUE(lit) << lit.message();
+      expect_agreement(&drawing, room, 20000, 15000);
     }
   }
 }
 
 TEST_F(FinishTest, ComesAndGoesAndLeavesTheScreenToTheLight) {
-  Room room = room_with(true);
+  JudgedRoom room = room_with(true);
   Renderer drawing = renderer(room.scene, room.rig);
   const cv::Mat grey(240, 320, CV_8UC3, cv::Scalar::all(90));
   const auto light = [&] { return drawing.projector_image(0, room.posed, room.viewer); };
@@ -159,21 +137,13 @@ TEST_F(FinishTest, ComesAndGoesAndLeavesTheScreenToTheLight) {
   EXPECT_EQ(cv::norm(screen(Composite::rest), bare_rest, cv::NORM_INF), 0);
 }
 
-// What the camera sees in the dark of a painted panel, as a share of a white panel at the renderer's level.
-struct Seen {
-  cv::Mat light;  // linear BGR
-  cv::Mat inside;
-};
-
-Seen seen_in_the_dark(Room* room, const std::vector<cv::Mat>& shown, double level, double mean_albedo) {
-  const sim::Samples samples = sim::trace(room->world, 0);
-  Seen seen{sim::ideal_light(room->world, samples, shown) / (level * mean_albedo),
-            cv::Mat(240, 320, CV_8U, cv::Scalar(0))};
+// The camera's pixels on the panel, without its rim.
+cv::Mat inside_of_panel(const sim::Samples& samples) {
+  cv::Mat inside(240, 320, CV_8U, cv::Scalar(0));
   for (std::size_t k = 0; k < samples.size(); ++k)
-    if (samples.object[k] == 0)
-      seen.inside.at<std::uint8_t>(samples.pixel[k] / 320, samples.pixel[k] % 320) = 255;
-  cv::erode(seen.inside, seen.inside, cv::Mat::ones(9, 9, CV_8U));
-  return seen;
+    if (samples.object[k] == 0) inside.at<std::uint8_t>(samples.pixel[k] / 320, samples.pixel[k] % 320) = 255;
+  cv::erode(inside, inside, cv::Mat::ones(9, 9, CV_8U));
+  return inside;
 }
 
 // The panel is painted in light and seen by the ray tracer: as wanted on grey clay, and on coloured clay.
@@ -181,7 +151,7 @@ TEST_F(FinishTest, IsSeenAsWantedInTheDarkAndOnColouredClay) {
   constexpr double k_level = 0.2;
   for (const bool is_coloured : {false, true}) {
     SCOPED_TRACE(is_coloured ? "coloured clay" : "grey clay");
-    Room room = room_with(true);
+    JudgedRoom room = room_with(true);
     room.posed.finish = "lacquer";
     room.posed.parts.clear();
     sim::Object& clay = room.world.objects[0];
@@ -202,20 +172,22 @@ TEST_F(FinishTest, IsSeenAsWantedInTheDarkAndOnColouredClay) {
     room.world.projector_effects = {{.gamma = 2.2}};
     Renderer drawing = renderer(room.scene, room.rig);
     ASSERT_TRUE(drawing.set_light({.compensation = Compensation::geometry, .level = k_level}));
-    const Seen seen =
-        seen_in_the_dark(&room, {drawing.projector_image(0, room.posed, room.viewer)}, k_level, mean_albedo);
+    const sim::Samples samples = sim::trace(room.world, 0);
+    const cv::Mat inside = inside_of_panel(samples);
+    // What the camera sees, linear BGR, as a share of a white panel at the renderer's level.
+    const std::vector<cv::Mat> shown = {drawing.projector_image(0, room.posed, room.viewer)};
+    const cv::Mat seen = sim::ideal_light(room.world, samples, shown) / (k_level * mean_albedo);
     // `view`: what the viewer should see; the camera takes the viewer's place in the judge.
     const cv::Mat wanted =
         sim::ReferenceRenderer(room.world, room.posed, room.viewer).projector_image(0).light;
     ASSERT_FALSE(wanted.empty());
-    sim::Samples samples = sim::trace(room.world, 0);
     double sum = 0, squares = 0;
     int count = 0, far_off = 0;
     for (std::size_t k = 0; k < samples.size(); ++k) {
       const int row = samples.pixel[k] / 320, column = samples.pixel[k] % 320;
       const sim::ProjectorView& view = samples.projectors[0][k];
       const cv::Point px(cvFloor(view.u), cvFloor(view.v));
-      if (samples.weight[k] < 1 || seen.inside.at<std::uint8_t>(row, column) == 0 || view.gain <= 0 ||
+      if (samples.weight[k] < 1 || inside.at<std::uint8_t>(row, column) == 0 || view.gain <= 0 ||
           !cv::Rect(4, 4, 312, 192).contains(px))
         continue;
       double worst = 0;
@@ -227,7 +199,7 @@ TEST_F(FinishTest, IsSeenAsWantedInTheDarkAndOnColouredClay) {
         const auto at = [&](int dx, int dy) { return wanted.at<cv::Vec3f>(px.y + dy, px.x + dx)[c]; };
         const float between =
             (1 - fy) * ((1 - fx) * at(0, 0) + fx * at(1, 0)) + fy * ((1 - fx) * at(0, 1) + fx * at(1, 1));
-        const double off = encode(seen.light.at<cv::Vec3f>(row, column)[c]) - encode(between);
+        const double off = encode(seen.at<cv::Vec3f>(row, column)[c]) - encode(between);
         worst = std::max(worst, std::abs(off));
         squares += off * off / 3;
       }

@@ -1,13 +1,10 @@
 // A picture of the room as light, against the ray tracer, which samples the picture itself.
 #include <cmath>
-#include <memory>
 #include <opencv2/imgproc.hpp>
 
 #include "core/photometric_response.h"
 #include "core/scale_resolution.h"
-#include "sim/reference_renderer.h"
 #include "tests/projector/judged_image.h"
-#include "tests/projector/sheet_room.h"
 
 namespace limn::projector {
 namespace {
@@ -50,19 +47,11 @@ cv::Mat studio() {
   return light;
 }
 
-struct Room {
+JudgedRoom room_of(double metallic, double roughness, double coat) {
   Rig rig = two_projectors();
-  Scene scene;
-  PosedScene posed;
-  sim::World world;
-  Imager viewer = viewer_from({-0.25, -0.3, -1.2});
-};
-
-Room room_of(double metallic, double roughness, double coat) {
-  Room room;
-  room.rig.projectors.pop_back();
-  EXPECT_TRUE(scale_resolution(0.2, &room.rig));
-  room.scene = scene_of(bowed_panel(), {});
+  rig.projectors.pop_back();
+  EXPECT_TRUE(scale_resolution(0.2, &rig));
+  Scene scene = scene_of(bowed_panel(), {});
   scene::Finish finish;
   finish.name = "paint";
   finish.base_colour = {0.75, 0.6, 0.5};
@@ -71,20 +60,14 @@ Room room_of(double metallic, double roughness, double coat) {
   finish.clearcoat = coat;
   finish.clearcoat_roughness = 0.1;
   finish.for_viewer = true;
-  room.scene.finishes = {finish};
-  room.scene.light = scene::RoomLight{k_up, Vector3d::Zero(), Vector3d::Zero(), {}, 0.8};
-  room.scene.room_image.emplace();
-  room.scene.room_image->light = studio();
+  scene.finishes = {finish};
+  scene.light = scene::RoomLight{k_up, Vector3d::Zero(), Vector3d::Zero(), {}, 0.8};
+  scene.room_image.emplace();
+  scene.room_image->light = studio();
   // The middle of the picture is behind the viewer, whose right is -x there.
-  room.scene.room_image->image_from_world << -1, 0, 0, 0, -1, 0, 0, 0, -1;
-  room.posed = posed_at_origin(room.scene);
+  scene.room_image->image_from_world << -1, 0, 0, 0, -1, 0, 0, 0, -1;
+  JudgedRoom room = judged_room(std::move(rig), std::move(scene), {-0.25, -0.3, -1.2});
   room.posed.finish = "paint";
-  room.world.rig = room.rig;
-  room.world.scene = room.scene;
-  sim::Object prototype;
-  prototype.name = "prototype";
-  prototype.mesh = std::make_shared<Mesh>(room.scene.prototype->mesh);
-  room.world.objects = {prototype};
   return room;
 }
 
@@ -133,17 +116,16 @@ double similarity(const cv::Mat& drawn, const sim::PartImage& judged, double gam
 
 TEST_F(RoomImageTest, IsReflectedAtFiveRoughnessesAsTheRayTracerSays) {
   for (const double roughness : {0.05, 0.25, 0.45, 0.7, 1.0}) {
-    const Room room = room_of(1, roughness, 0);
+    const JudgedRoom room = room_of(1, roughness, 0);
     Renderer drawing = renderer(room.scene, room.rig);
     const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
-    const cv::Mat black = cv::Mat::zeros(room.rig.cameras[0].height, room.rig.cameras[0].width, CV_8UC1);
-    const double seen = similarity(drawing.composite(0, black, room.posed, Composite::full),
-                                   judge.parts_image(room.rig.cameras[0]), 0);
+    const double seen =
+        similarity(composite_over_black(&drawing, room), judge.parts_image(room.rig.cameras[0]), 0);
     fmt::print("roughness {:.2f}: SSIM {:.4f} in composites\n", roughness, seen);
     EXPECT_GE(seen, 0.98) << roughness;
   }
   for (const double roughness : {0.25, 0.7}) {
-    const Room room = room_of(1, roughness, 0);
+    const JudgedRoom room = room_of(1, roughness, 0);
     Renderer drawing = renderer(room.scene, room.rig);
     const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
     const double lit =
@@ -154,7 +136,7 @@ TEST_F(RoomImageTest, IsReflectedAtFiveRoughnessesAsTheRayTracerSays) {
 }
 
 TEST_F(RoomImageTest, LightsPaintWithAClearLayerAsTheRayTracerSays) {
-  const Room room = room_of(0, 0.6, 1);
+  const JudgedRoom room = room_of(0, 0.6, 1);
   Renderer drawing = renderer(room.scene, room.rig);
   const sim::ReferenceRenderer judge(room.world, room.posed, room.viewer);
   EXPECT_GE(similarity(drawing.projector_image(0, room.posed, room.viewer), judge.projector_image(0), 2.2),
@@ -162,7 +144,7 @@ TEST_F(RoomImageTest, LightsPaintWithAClearLayerAsTheRayTracerSays) {
 }
 
 TEST_F(RoomImageTest, ALooksLightDecidesHowStrongItIs) {
-  Room room = room_of(0, 1, 0);
+  JudgedRoom room = room_of(0, 1, 0);
   Renderer drawing = renderer(room.scene, room.rig);
   const auto mean = [&] { return cv::mean(drawing.projector_image(0, room.posed, room.viewer))[1]; };
   const double own = mean();
