@@ -100,8 +100,7 @@ Result<std::vector<DemoImage>> painted_images(const DemoPainting& painting) {
        sim::photograph(world, samples, {}, world.seed)},
       {"painted", "Painted in light",
        "The same door in blue lacquer, with the mirror and the trim line on it. For the designer's viewpoint "
-       "the "
-       "lacquer mirrors a photographer's studio.",
+       "the lacquer mirrors a photographer's studio.",
        sim::photograph(world, samples, images, world.seed)}};
 }
 

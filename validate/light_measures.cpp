@@ -27,16 +27,22 @@ std::pair<cv::Mat, cv::Mat> bounds_of_light(CheckRun& run) {
     alone.copyTo(high, candidate & ~begun);
     begun |= candidate;
   }
-  // Full light is the most that a projector alone can be asked for, so a brighter highlight may be cut off
-  // there.
-  return {cv::min(low, cv::Scalar::all(1)), high};
+  return {low, high};
+}
+
+// Where a projector shows full light in a channel, CV_8UC3: it can give no more there.
+cv::Mat at_full_light(CheckRun& run) {
+  std::vector<cv::Mat> full;
+  for (const cv::Mat& image : run.projector_images()) full.push_back(image == cv::Scalar::all(255));
+  return run.reference_view().rendered_light(full) > 0;
 }
 
 }  // namespace
 
 Status judge_shone(CheckRun& run) {
   const cv::Mat actual = run.reference_view().rendered_light(run.projector_images());
-  const auto [low, high] = bounds_of_light(run);
+  auto [low, high] = bounds_of_light(run);
+  cv::Mat(cv::min(low, cv::Scalar::all(1))).copyTo(low, at_full_light(run));
   const cv::Mat illuminated = any_channel_over(actual, k_dark) | any_channel_over(high, k_dark);
   if (cv::countNonZero(illuminated) == 0)
     return run.nothing_to_judge("shone_…", "a part on the prototype in the viewer's image");
