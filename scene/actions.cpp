@@ -123,6 +123,25 @@ std::string unused_look_name(const ShowState& show_state) {
     if (std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
 }
 
+// Edits that came after the last frame was drawn are part of the look, too.
+void take_edits_since(const Scene& scene, const ShowState& show_state, Look* look) {
+  for (std::size_t i = 0; i < scene.slots.size(); ++i) {
+    const ShowState::Slot& slot = show_state.slots[i];
+    auto part = std::find_if(look->parts.begin(), look->parts.end(),
+                             [&](const Look::Part& p) { return p.slot == scene.slots[i].name; });
+    if (part == look->parts.end()) {
+      if (!slot.pin) continue;
+      part =
+          look->parts.insert(part, {.slot = scene.slots[i].name, .variant = {}, .prototype_from_part = {}});
+    }
+    part->variant = slot.variant;
+    part->material = slot.material;
+    if (slot.pin) part->prototype_from_part = slot.pin->prototype_from_part;
+  }
+  look->light = show_state.light;
+  look->finish = show_state.finish;
+}
+
 Status save_look(Change* change, const std::string& name) {
   ShowState& show_state = change->show_state;
   const PosedScene& posed = change->posed;
@@ -136,8 +155,10 @@ Status save_look(Change* change, const std::string& name) {
   for (const PosedPart& part : posed.parts)
     look.parts.push_back(
         {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material});
-  look.light = posed.light ? posed.light : change->scene.light;
+  look.light = posed.light;
   look.finish = posed.finish;
+  if (!show_state.frozen) take_edits_since(change->scene, show_state, &look);
+  if (!look.light) look.light = change->scene.light;
   remember_look(look.name, &show_state);
   std::erase_if(show_state.looks, [&](const Look& known) { return known.name == look.name; });
   show_state.looks.push_back(std::move(look));

@@ -346,6 +346,34 @@ TEST(ShowState, LightComesFromWhereItIsSaid) {
   EXPECT_EQ(show_state.looks[0].light, scene.light);
 }
 
+// Several edits may be done before the next frame is drawn.
+TEST(ShowState, ALookHasTheEditsThatNoFrameHasShownYet) {
+  const Scene scene = two_slots();
+  const std::vector<Track> tracks = tracks_with(k_prototype_from_marker);
+  const PosedScene posed = compose_scene(scene, initial_show_state(scene), tracks);
+  ShowState show_state = done(scene, initial_show_state(scene), posed, {"save_look", "", "first"});
+  show_state = done(scene, show_state, posed, {"choose_variant", "mirror", "b"});
+  show_state = done(scene, show_state, posed, {"material", "mirror", "#ff0080 1 0.25"});
+  show_state = done(scene, show_state, posed, {"light", "", "30 45 0.6 0.3 0.1"});
+  const ShowState second = done(scene, show_state, posed, {"save_look", "", "second"});
+  const Look& look = second.looks[1];
+  ASSERT_EQ(look.parts.size(), 1u);
+  EXPECT_EQ(look.parts[0].variant, "b");
+  EXPECT_EQ(look.parts[0].material, show_state.slots[0].material);
+  EXPECT_EQ(look.light, show_state.light);
+  // A frozen picture is saved as it is seen.
+  show_state = done(scene, show_state, posed, {"freeze", "", "on"});
+  show_state = done(scene, show_state, posed, {"save_look", "", "third"});
+  EXPECT_EQ(show_state.looks[1].parts[0].variant, "a");
+  EXPECT_TRUE(show_state.looks[1].parts[0].material.is_none());
+  // A part whose place is restored by a look, but was not shown.
+  show_state = done(scene, second, {}, {"restore_look", "", "second"});
+  show_state = done(scene, show_state, {}, {"save_look", "", "fourth"});
+  ASSERT_EQ(show_state.looks[2].parts.size(), 1u);
+  EXPECT_TRUE(
+      limn::is_same(show_state.looks[2].parts[0].prototype_from_part, look.parts[0].prototype_from_part));
+}
+
 TEST(ShowState, BringsBackTheLookThatWasDeleted) {
   const Scene scene = two_slots();
   ShowState show_state = done(scene, initial_show_state(scene), {}, {"save_look", "", "A"});
