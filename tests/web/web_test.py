@@ -19,7 +19,7 @@ import time
 import urllib.parse
 import zlib
 
-from browser import ENTER, ESCAPE, TAB, Browser, Driver, Failed, wait_for
+from browser import ENTER, ESCAPE, TAB, WAIT_S, Browser, Driver, Failed, wait_for
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 CONFIG = os.path.join(HERE, "..", "..", "config")
@@ -29,9 +29,10 @@ MOST_BYTES, MOST_READY_MS, MOST_HEARD_MS = 300_000, 1000, 200
 MOST_BESIDE_MM = 120  # largest distance of the mirror from the marker that carries it, in each direction
 LEAST_TARGET_PX, LEAST_CONTRAST = 48, 4.5
 MOST_OFF_PX, LEAST_OVERLAP = 3.0, 0.6  # limits for the mirror in the window's images
+MADE_UP_LOOKS = "noon", "dusk", "night", "dawn", "rain", "snow"
 MIRROR = ".slot:first-child"
 BLACKOUT = "#stage-buttons [data-action=blackout]"
-LAID, LAID_AT_M = "aruco_4x4_50:9", [0.12, -0.03, 0.052]  # on the door; it carries no part
+LAID, LAID_AT_M = "aruco_4x4_50:9", [-0.14, -0.01, 0.053]  # on the door, away from its markers; it carries no part
 A4_IN = 8.27, 11.69
 
 
@@ -47,7 +48,7 @@ def expect(is_so, what, found=""):
 
 def with_laid_marker(world):
     """A world's text, with an added marker on the prototype that the scene does not use."""
-    place = {"rotation_wxyz": [-0.036792076, 0.999285831, -0.000316876, 0.008606471], "translation_m": LAID_AT_M}
+    place = {"rotation_wxyz": [-0.036, 0.998551, 0, 0.04], "translation_m": LAID_AT_M}
     laid = json.dumps([{"name": LAID, "size_mm": 40, "prototype_from_marker": place}])
     return world.replace("{", '{"loose_markers": ' + laid + ",", 1)
 
@@ -142,7 +143,9 @@ class Checks:
         return self.browser.script("return document.body.dataset.status") == "connected"
 
     def severe(self):
-        return [entry["message"] for entry in self.browser.log("browser") if entry["level"] == "SEVERE"]
+        """Errors on the console since the last call, but for missing images of the looks that a check makes up."""
+        messages = [entry["message"] for entry in self.browser.log("browser") if entry["level"] == "SEVERE"]
+        return [message for message in messages if not any(f"/look/{look}.png" in message for look in MADE_UP_LOOKS)]
 
     def screenshots(self, name, sizes=tuple(SIZES)):
         for size in sizes:
@@ -200,7 +203,8 @@ class Checks:
         browser.type("[name=pin]", self.live.pins["operate"])
         wait_for("a session", self.is_connected)
         times = []
-        while len(times) < 3 and min(times, default=MOST_READY_MS + 1) > MOST_READY_MS:
+        until = time.monotonic() + WAIT_S
+        while not times or min(times) > MOST_READY_MS and time.monotonic() < until:
             browser.cdp("Network.clearBrowserCache")
             self.open("/")
             times.append(wait_for("a page that shows the state", lambda: browser.script(
@@ -360,7 +364,10 @@ class Checks:
             expect(not offered, "nothing offered to somebody who looks on", offered)
             bo.settle()
             bo.screenshot(os.path.join(self.out, "looking-on-phone.png"))
-            times = self.measured["heard_ms"] = [self._heard_ms(bo, value) for value in ("on", "off", "on", "off")]
+            times, until = [], time.monotonic() + WAIT_S
+            while len(times) < 4 or min(times) > MOST_HEARD_MS and time.monotonic() < until:
+                times += [self._heard_ms(bo, value) for value in ("on", "off")]
+            self.measured["heard_ms"] = times
         finally:
             bo.close()
         expect(min(times) <= MOST_HEARD_MS, f"an edit at all within {MOST_HEARD_MS} ms", times)
@@ -391,7 +398,7 @@ class Checks:
         self.tab("parts")
         wait_for("the marker to be offered", lambda: LAID in self.browser.text(offer))
         self.screenshots("offer", [PHONE])
-        before = shown()
+        before = wait_for("steady light", lambda: max(one := shown()) > 60 and difference(one, shown()) < 20 and one)
         self.browser.click(f"{offer} [data-action=pair]")  # the first part, the mirror
         wait_for("it to carry the mirror", lambda: self.mirror()["marker"] == LAID)
         far_mm = lambda pose: pose and 1000 * max(abs(a - b) for a, b in zip(pose["translation_m"], LAID_AT_M))
@@ -520,7 +527,7 @@ class Checks:
     def looks_are_printed_as_a_contact_sheet(self):
         sheet = self.browser.script_async("""
             const state = await (await fetch("/api/state")).json();
-            state.looks = ["evening", "noon", "dusk", "night", "dawn", "rain", "snow"];
+            state.looks = ["evening", ...args];
             const data = JSON.stringify({ ...state, type: "state" });
             limn_test.is_deaf = true;  // ignores the session's own state, which has one look
             limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
@@ -529,14 +536,13 @@ class Checks:
               Object.assign(other, { width: one.width, height: one.height });
               other.getContext("2d").drawImage(one, 0, 0);
             }
-            return others.length;""")
+            return others.length;""", *MADE_UP_LOOKS)
         expect(sheet == 6, "seven looks", 1 + sheet)
         paper = self.browser.cdp("Page.printToPDF", paperWidth=A4_IN[0], paperHeight=A4_IN[1])
         pdf = base64.b64decode(paper["data"])
         with open(os.path.join(self.out, "looks.pdf"), "wb") as file:
             file.write(pdf)
         self.browser.script("limn_test.is_deaf = false")
-        self.browser.log("browser")  # discards messages about six looks without an image
         # An image that crosses a page break is drawn on both pages.
         pictures = [stream.count(b" Do\n") for stream in streams_of(pdf) if b" cm\n" in stream]
         expect(pictures == [6, 1], "six whole looks on a page, and the last on another", pictures)
