@@ -68,8 +68,9 @@ struct Command {
 /// Reads an edit. Error: an unknown action or slot, or a value that the action does not take.
 Result<Command> command_of(const Scene& scene, const Edit& edit);
 
-/// The show state after a command. `posed` is what was shown last: looks are saved from it. Error: an unknown
-/// variant, look, marker or screen, or an action that is impossible at present.
+/// The show state after a command. `posed` is what was shown last: looks have the parts' places from it, and
+/// all else from the show state; while that is frozen, all from `posed`. Error: an unknown variant, look,
+/// marker or screen, or an action that is impossible at present.
 Result<ShowState> apply_edit(const Scene& scene,
                              const ShowState& show_state,
                              const PosedScene& posed,

@@ -80,8 +80,7 @@ Result<Leaves> leaves_of(const Handle(TDocStd_Document) & document, const std::f
     if (leaves.all.size() > k_most_leaves)
       return error(
           "{}: expected at most {} placed parts, found more in assemblies within assemblies. Export a part "
-          "of "
-          "the assembly.",
+          "of the assembly.",
           path.string(), k_most_leaves);
   }
   return leaves;
