@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::apps {
 

@@ -33,7 +33,7 @@
 #include "session/perception.h"
 #include "session/pose_feeds.h"
 #include "session/pose_sender.h"
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "session/session.h"
 #include "session/session_output.h"
 #include "session/virtual_room.h"

@@ -5,8 +5,8 @@
 #include "core/json_text.h"
 #include "core/log.h"
 #include "core/print.h"
-#include "scene/mesh_content.h"
 #include "scene/files/source_file.h"
+#include "scene/meshes/mesh_content.h"
 
 namespace limn::exchange {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/result.h"
 #include "core/rig.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::exchange {
 

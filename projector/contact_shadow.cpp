@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "projector/bindings.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 
 namespace limn::projector {
 namespace {

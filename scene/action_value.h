@@ -9,7 +9,7 @@
 #include "core/pose.h"
 #include "core/result.h"
 #include "scene/material_override.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "scene/room_light.h"
 #include "scene/show_state.h"
 

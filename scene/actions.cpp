@@ -5,7 +5,7 @@
 
 #include "core/names.h"
 #include "scene/command_text.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::scene {
 

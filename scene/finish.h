@@ -7,7 +7,7 @@
 #include "core/config.h"
 #include "core/pose.h"
 #include "core/result.h"
-#include "scene/material.h"
+#include "scene/meshes/material.h"
 
 namespace limn::scene {
 

@@ -6,7 +6,7 @@
 #include "core/config.h"
 #include "core/linear_algebra.h"
 #include "core/names.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 
 namespace limn::scene {
 namespace {

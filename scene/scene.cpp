@@ -17,7 +17,8 @@
 #include "core/utf8.h"
 #include "scene/actions.h"
 #include "scene/marker_file.h"
-#include "scene/mesh_content.h"
+#include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_loading.h"
 #include "scene/scene_loading.h"
 #include "scene/slot_folder.h"
 

@@ -14,7 +14,7 @@
 #include "core/result.h"
 #include "scene/action_id.h"
 #include "scene/finish.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "scene/room_image.h"
 #include "scene/room_light.h"
 

@@ -1,28 +1,16 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 #include <stop_token>
 #include <vector>
 
 #include "core/result.h"
-#include "scene/mesh.h"
 #include "scene/scene.h"
 
 namespace limn::scene {
 
-/// As load_mesh_with_variants() of scene/mesh.h; the reading of a CAD file, which may take minutes, ends with
-/// an error when `stop` is requested.
-Result<MeshWithVariants> load_mesh_with_variants(const std::filesystem::path& path,
-                                                 std::optional<LengthUnit> units,
-                                                 const std::stop_token& stop);
-
-/// Likewise for load_mesh() of scene/mesh.h.
-Result<Mesh> load_mesh(const std::filesystem::path& path,
-                       std::optional<LengthUnit> units,
-                       const std::stop_token& stop);
-
-/// Likewise for load_scene() of scene/scene.h.
+/// As load_scene() of scene/scene.h; the reading of a CAD file, which may take minutes, ends with an error
+/// when `stop` is requested.
 Result<Scene> load_scene(const std::filesystem::path& path,
                          std::vector<SkippedVariant>* skipped_variants,
                          EmptySlots empty_slots,

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "core/utf8.h"
-#include "scene/mesh_content.h"
+#include "scene/meshes/mesh_content.h"
 
 namespace limn::scene {
 namespace {

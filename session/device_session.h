@@ -13,7 +13,7 @@
 #include "device/key_source.h"
 #include "session/device_health.h"
 #include "session/frame_loop.h"
-#include "session/keys.h"
+#include "session/requests/keys.h"
 
 namespace limn::session {
 

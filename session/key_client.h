@@ -4,7 +4,7 @@
 
 #include "device/key_source.h"
 #include "session/device_health.h"
-#include "session/keys.h"
+#include "session/requests/keys.h"
 #include "session/session_client.h"
 
 namespace limn::session {

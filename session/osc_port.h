@@ -7,7 +7,7 @@
 
 #include "core/result.h"
 #include "device/udp_socket.h"
-#include "session/osc.h"
+#include "session/requests/osc.h"
 #include "session/session.h"
 #include "session/session_client.h"
 #include "session/telemetry.h"

@@ -1,6 +1,6 @@
 #include "session/scene_watch.h"
 
-#include "scene/cad_file.h"
+#include "scene/meshes/cad_file.h"
 #include "scene/scene_loading.h"
 
 namespace limn::session {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "core/linear_algebra.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 #include "tracker/marker_image.h"
 
 namespace limn::session {

@@ -6,7 +6,7 @@
 #include "core/result.h"
 #include "session/frame_loop.h"
 #include "session/pace_control.h"
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "sim/virtual_rig.h"
 
 namespace limn::session {

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/json_text.h"
-#include "scene/glb.h"
+#include "scene/meshes/glb.h"
 #include "scene/posed_scene.h"
 #include "sim/ray_scene.h"
 

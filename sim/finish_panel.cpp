@@ -8,8 +8,8 @@
 #include <opencv2/core.hpp>
 
 #include "core/photometric_response.h"
-#include "scene/glb.h"
-#include "scene/tangents.h"
+#include "scene/meshes/glb.h"
+#include "scene/meshes/tangents.h"
 
 namespace limn::sim {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "core/imager.h"
 #include "core/pose.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::sim {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
 
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::sim {
 

@@ -16,7 +16,7 @@
 #include "core/marker_drawing.h"
 #include "core/result.h"
 #include "core/rig.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 

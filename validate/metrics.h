@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/imager.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "sim/world.h"
 
 namespace limn::validate {

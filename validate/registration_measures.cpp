@@ -5,7 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "scene/scan_preview.h"
+#include "scene/meshes/scan_preview.h"
 #include "validate/check_images.h"
 #include "validate/check_measures.h"
 #include "validate/metrics.h"

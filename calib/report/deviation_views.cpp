@@ -10,7 +10,7 @@
 
 #include "calib/surface/deviation_scale.h"
 #include "core/imager.h"
-#include "scene/scan_preview.h"
+#include "scene/meshes/scan_preview.h"
 
 namespace limn::calib {
 namespace {

@@ -11,7 +11,7 @@
 #include <unordered_map>
 
 #include "core/median.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 
 namespace limn::calib {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "calib/code/decode.h"
 #include "core/imager.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/scan_surface.h"
 
 namespace limn::calib {
 

@@ -9,7 +9,7 @@
 #include "calib/surface/registration.h"
 #include "core/log.h"
 #include "core/names.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 
 namespace limn::calib {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "scene/mesh.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/mesh.h"
+#include "scene/meshes/scan_surface.h"
 
 namespace limn::calib {
 

@@ -4,7 +4,7 @@
 #include <span>
 
 #include "calib/surface/range_view.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/scan_surface.h"
 
 namespace limn::calib {
 

@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-// What tells whether a GLB still belongs to its CAD file (scene/cad_file.cpp reads it).
+// What tells whether a GLB still belongs to its CAD file (scene/meshes/cad_file.cpp reads it).
 ordered_json extras_of(const CadModel& model, const Tessellation& how) {
   ordered_json sources = ordered_json::array();
   for (const CadSource& source : model.sources)

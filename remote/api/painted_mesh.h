@@ -1,7 +1,7 @@
 #pragma once
 
 #include "scene/finish.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::remote {
 

@@ -10,8 +10,8 @@
 #include "device/jpeg.h"
 #include "remote/api/painted_mesh.h"
 #include "remote/api/responses.h"
-#include "scene/glb.h"
 #include "scene/kept_files.h"
+#include "scene/meshes/glb.h"
 
 namespace limn::remote {
 namespace {

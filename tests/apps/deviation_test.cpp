@@ -14,7 +14,7 @@
 #include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/scan_surface.h"
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
 #include "tests/calib/scanned_panel.h"

@@ -31,7 +31,7 @@
 #include "device/jpeg.h"
 #include "session/perception.h"
 #include "session/recording.h"
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "session/session.h"
 #include "session/session_output.h"
 #include "session/virtual_session.h"

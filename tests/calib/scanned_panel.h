@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "core/pose.h"
-#include "scene/mesh.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/mesh.h"
+#include "scene/meshes/scan_surface.h"
 
 namespace limn::test {
 

@@ -14,7 +14,7 @@
 #include "core/data_folder.h"
 #include "core/file.h"
 #include "scene/files/cad_program.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "tests/exchange/step_text.h"
 #include "tests/support/matchers.h"
 

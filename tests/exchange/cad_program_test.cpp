@@ -12,8 +12,8 @@
 
 #include "core/file.h"
 #include "exchange/cad_import.h"
-#include "scene/cad_file.h"
-#include "scene/mesh.h"
+#include "scene/meshes/cad_file.h"
+#include "scene/meshes/mesh.h"
 #include "scene/scene.h"
 #include "tests/exchange/cad_folder.h"
 

@@ -15,7 +15,7 @@
 
 #include "exchange/cad_import.h"
 #include "scene/files/cad_program.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "tests/exchange/cad_folder.h"
 #include "tests/exchange/iges_text.h"
 #include "tests/exchange/step_text.h"

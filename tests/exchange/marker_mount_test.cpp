@@ -11,7 +11,7 @@
 #include "apps/markers.h"
 #include "core/config.h"
 #include "core/file.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "tests/support/matchers.h"
 
 namespace limn::exchange {

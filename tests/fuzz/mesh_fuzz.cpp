@@ -9,7 +9,7 @@
 #include "core/log.h"
 #include "exchange/zip.h"
 #include "scene/files/gltf_file.h"
-#include "scene/mesh_from_content.h"
+#include "scene/meshes/mesh_from_content.h"
 #include "tests/fuzz/fuzz_file.h"
 
 namespace {

@@ -1,6 +1,6 @@
 // Datagrams of Open Sound Control.
 #include "core/utf8.h"
-#include "session/osc.h"
+#include "session/requests/osc.h"
 #include "tests/fuzz/fuzz_file.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -1,5 +1,5 @@
 // PLY files of points and surfaces.
-#include "scene/scan_surface.h"
+#include "scene/meshes/scan_surface.h"
 #include "tests/fuzz/fuzz_file.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

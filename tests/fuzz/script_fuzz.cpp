@@ -1,5 +1,5 @@
 // Scripts of a virtual session.
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "tests/fuzz/fuzz_file.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

@@ -25,7 +25,8 @@ using Names = std::set<std::string>;
 // Each room and the rooms that it may include. Folders with a library of their own (exchange/poses) count as
 // rooms.
 const std::map<std::string, Names>& allowed() {
-  static const Names k_libraries = {"core", "scene", "device", "calib", "tracker", "projector", "sim"};
+  static const Names k_libraries = {"core",  "scene",   "scene/meshes", "device",
+                                    "calib", "tracker", "projector",    "sim"};
   static const auto with = [](const Names& more) {
     Names all = k_libraries;
     all.insert(more.begin(), more.end());
@@ -34,32 +35,37 @@ const std::map<std::string, Names>& allowed() {
   static const std::map<std::string, Names> arrows = {
       {"core", {}},
       {"scene/files", {"core"}},
-      {"scene", {"core", "scene/files"}},
+      {"scene/meshes", {"core", "scene/files"}},
+      {"scene", {"core", "scene/files", "scene/meshes"}},
       {"device", {"core"}},
-      {"calib", {"core", "scene"}},
+      {"calib", {"core", "scene", "scene/meshes"}},
       {"tracker", {"core"}},
-      {"projector", {"core", "scene"}},
-      {"sim", {"core", "scene", "device"}},
+      {"projector", {"core", "scene", "scene/meshes"}},
+      {"sim", {"core", "scene", "scene/meshes", "device"}},
       {"device/gui", {"core", "device"}},
-      {"exchange", {"core", "scene/files", "scene", "projector", "exchange/curves"}},
+      {"exchange", {"core", "scene/files", "scene", "scene/meshes", "projector", "exchange/curves"}},
       {"exchange/cad", {"core", "scene/files", "exchange/curves"}},
       {"exchange/curves", {"core"}},
       {"exchange/poses", {"core"}},
       {"exchange/printing", {"core", "calib", "tracker"}},
       {"wizard/design", {"core", "calib", "tracker"}},
-      {"wizard/measure", {"core", "scene", "calib", "tracker"}},
+      {"wizard/measure", {"core", "scene", "scene/meshes", "calib", "tracker"}},
       {"wizard", with({"device/gui", "wizard/measure"})},
-      {"session/drawing", {"core", "scene", "tracker", "projector"}},
-      {"session", with({"device/gui", "exchange/poses", "wizard", "session/drawing"})},
-      {"remote", with({"device/gui", "session", "session/drawing"})},
-      {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing", "remote"})},
-      {"validate", with({"wizard", "wizard/measure", "session", "session/drawing"})},
+      {"session/drawing", {"core", "scene", "scene/meshes", "tracker", "projector"}},
+      {"session/requests", {"core", "scene", "scene/meshes", "sim", "exchange/poses"}},
+      {"session", with({"device/gui", "exchange/poses", "wizard", "session/drawing", "session/requests"})},
+      {"remote", with({"device/gui", "session", "session/drawing", "session/requests"})},
+      {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing",
+                      "session/requests", "remote"})},
+      {"validate", with({"wizard", "wizard/measure", "session", "session/drawing", "session/requests"})},
       {"validate/hardware_report", {"core", "device", "calib", "tracker", "sim", "wizard", "nodes"}},
-      {"library", {"core", "scene", "device", "calib", "tracker", "projector", "exchange", "wizard/measure"}},
+      {"library",
+       {"core", "scene", "scene/meshes", "device", "calib", "tracker", "projector", "exchange",
+        "wizard/measure"}},
       {"library/python", {}},  // the public headers alone
-      {"apps",
-       with({"device/gui", "exchange", "exchange/printing", "wizard", "wizard/design", "wizard/measure",
-             "session", "session/drawing", "remote", "nodes", "validate", "validate/hardware_report"})},
+      {"apps", with({"device/gui", "exchange", "exchange/printing", "wizard", "wizard/design",
+                     "wizard/measure", "session", "session/drawing", "session/requests", "remote", "nodes",
+                     "validate", "validate/hardware_report"})},
   };
   return arrows;
 }
@@ -89,8 +95,8 @@ const std::map<std::string, Names>& guests() {
       {"mrcal/", {"core"}},
       {"core/mrcal.h", {"core", "calib"}},
       {"ceres/", {"calib"}},
-      {"assimp/", {"scene"}},
-      {"meshoptimizer", {"scene", "scene/files"}},
+      {"assimp/", {"scene/meshes"}},
+      {"meshoptimizer", {"scene/meshes", "scene/files"}},
       {"draco/", {"scene/files"}},
       {"opencascade/", {"exchange/cad"}},  // a program of its own, in an optional package
       {"embree3/", {"sim"}},
@@ -109,9 +115,9 @@ const std::map<std::string, Names>& guests() {
       {"png.h", {"core"}},
       {"tiffio", {"core"}},
       {"webp/", {"core"}},
-      {"zip.h", {"scene", "exchange"}},
+      {"zip.h", {"scene/meshes", "exchange"}},
       {"lo/", {"exchange/poses"}},
-      {"pugixml", {"core", "scene", "exchange"}},
+      {"pugixml", {"core", "scene/meshes", "exchange"}},
       {"yaml-cpp/", {"core"}},
       {"OpenEXR/", {"scene/files", "exchange"}},
       {"cairo", {"exchange/printing"}},

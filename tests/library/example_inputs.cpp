@@ -18,7 +18,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "scene/marker_file.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/scan_surface.h"
 #include "tests/tracker/marker_images.h"
 
 namespace limn::test {

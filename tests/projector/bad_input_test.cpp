@@ -8,7 +8,7 @@
 #include "projector/gl.h"
 #include "projector/gpu_scene.h"
 #include "projector/renderer.h"
-#include "scene/tangents.h"
+#include "scene/meshes/tangents.h"
 #include "tests/projector/gl_test.h"
 #include "tests/support/meshes.h"
 

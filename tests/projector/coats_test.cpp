@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "scene/tangents.h"
+#include "scene/meshes/tangents.h"
 #include "tests/projector/judged_image.h"
 #include "tests/support/matchers.h"
 

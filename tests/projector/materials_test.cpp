@@ -6,7 +6,7 @@
 #include "core/image_io.h"
 #include "core/photometric_response.h"
 #include "projector/composite_policy.h"
-#include "scene/tangents.h"
+#include "scene/meshes/tangents.h"
 #include "sim/ray_scene.h"
 #include "tests/projector/sheet_room.h"
 #include "tests/support/matchers.h"

@@ -10,7 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {

@@ -3,10 +3,10 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "scene/glb.h"
-#include "scene/mesh_from_content.h"
+#include "scene/meshes/glb.h"
+#include "scene/meshes/mesh_from_content.h"
+#include "scene/meshes/tangents.h"
 #include "scene/scene.h"
-#include "scene/tangents.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {

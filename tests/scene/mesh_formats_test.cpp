@@ -8,7 +8,7 @@
 
 #include "core/file.h"
 #include "exchange/zip.h"
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {

@@ -1,4 +1,4 @@
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -10,9 +10,9 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
-#include "scene/glb.h"
-#include "scene/mesh_bvh.h"
-#include "scene/tangents.h"
+#include "scene/meshes/glb.h"
+#include "scene/meshes/mesh_bvh.h"
+#include "scene/meshes/tangents.h"
 #include "tests/support/matchers.h"
 
 namespace limn::scene {

@@ -1,11 +1,11 @@
-#include "scene/scan_surface.h"
+#include "scene/meshes/scan_surface.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
 #include "core/file.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 #include "sim/car_door.h"
 #include "tests/support/matchers.h"
 

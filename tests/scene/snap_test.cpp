@@ -2,7 +2,7 @@
 
 #include <cstdio>
 
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 #include "scene/posed_scene.h"
 #include "tests/support/matchers.h"
 #include "tests/tracker/seen_body.h"

@@ -15,7 +15,7 @@
 #include "session/frame_composer.h"
 #include "session/perception.h"
 #include "session/recording.h"
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "sim/virtual_rig.h"
 #include "tests/support/matchers.h"
 #include "tests/support/soak.h"

@@ -1,5 +1,5 @@
 // Keys trigger the actions that they belong to, for the chosen slot.
-#include "session/keys.h"
+#include "session/requests/keys.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "session/osc.h"
+#include "session/requests/osc.h"
 
 #include <gtest/gtest.h>
 #include <lo/lo.h>

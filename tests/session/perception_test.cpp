@@ -11,7 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/json_text.h"
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"
 #include "tests/support/matchers.h"

@@ -18,7 +18,7 @@
 #include "exchange/poses/posi_stage_net.h"
 #include "session/pose_feeds.h"
 #include "session/pose_sender.h"
-#include "session/script.h"
+#include "session/requests/script.h"
 #include "session/virtual_session.h"
 #include "sim/virtual_rig.h"
 #include "tests/session/studio.h"

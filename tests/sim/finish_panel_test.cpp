@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "scene/mesh_bvh.h"
+#include "scene/meshes/mesh_bvh.h"
 #include "scene/scene.h"
 #include "tests/support/matchers.h"
 

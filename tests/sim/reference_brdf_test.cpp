@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
-#include "scene/tangents.h"
+#include "scene/meshes/tangents.h"
 #include "sim/ray_scene.h"
 #include "tests/support/matchers.h"
 

@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "scene/tangents.h"
+#include "scene/meshes/tangents.h"
 #include "tests/support/matchers.h"
 
 namespace limn::sim {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <functional>
 
-#include "scene/mesh.h"
+#include "scene/meshes/mesh.h"
 
 namespace limn::test {
 

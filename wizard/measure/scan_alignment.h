@@ -10,9 +10,9 @@
 #include "calib/surface/scan_size.h"
 #include "core/result.h"
 #include "core/stage.h"
-#include "scene/mesh.h"
-#include "scene/mesh_bvh.h"
-#include "scene/scan_surface.h"
+#include "scene/meshes/mesh.h"
+#include "scene/meshes/mesh_bvh.h"
+#include "scene/meshes/scan_surface.h"
 
 namespace limn::wizard {
 

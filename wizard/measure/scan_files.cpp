@@ -11,7 +11,7 @@
 #include "core/image_io.h"
 #include "core/json_text.h"
 #include "core/stopwatch.h"
-#include "scene/scan_preview.h"
+#include "scene/meshes/scan_preview.h"
 
 namespace limn::wizard {
 namespace {
