@@ -7,7 +7,7 @@ install(TARGETS limn RUNTIME COMPONENT program)
 if(TARGET limn-cad)
   install(TARGETS limn-cad RUNTIME COMPONENT cad)
 endif()
-install(TARGETS limn_room_dds limn_video LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
+install(TARGETS limn_room_dds limn_video limn_volume_readers LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
 install(FILES ${install_files}/limn.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT program)
 install(FILES ${install_files}/io.github.limn.metainfo.xml
   DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo COMPONENT program)

@@ -25,7 +25,7 @@ using Names = std::set<std::string>;
 // Each room and the rooms that it may include. Folders with a library of their own (exchange/poses) count as
 // rooms.
 const std::map<std::string, Names>& allowed() {
-  static const Names k_libraries = {"core",  "scene",   "scene/meshes", "device",
+  static const Names k_libraries = {"core",  "scene",   "scene/meshes", "scene/volumes", "device",
                                     "calib", "tracker", "projector",    "sim"};
   static const auto with = [](const Names& more) {
     Names all = k_libraries;
@@ -36,7 +36,8 @@ const std::map<std::string, Names>& allowed() {
       {"core", {}},
       {"scene/files", {"core"}},
       {"scene/meshes", {"core", "scene/files"}},
-      {"scene", {"core", "scene/files", "scene/meshes"}},
+      {"scene/volumes", {"core"}},
+      {"scene", {"core", "scene/files", "scene/meshes", "scene/volumes"}},
       {"device", {"core"}},
       {"calib", {"core", "scene", "scene/meshes"}},
       {"tracker", {"core"}},
@@ -98,6 +99,8 @@ const std::map<std::string, Names>& guests() {
       {"assimp/", {"scene/meshes"}},
       {"meshoptimizer", {"scene/meshes", "scene/files"}},
       {"draco/", {"scene/files"}},
+      {"nifti/", {"scene/volumes"}},
+      {"dcmtk/", {"scene/volumes"}},
       {"opencascade/", {"exchange/cad"}},  // a program of its own, in an optional package
       {"embree3/", {"sim"}},
       {"embree4/", {"sim"}},
