@@ -160,6 +160,9 @@ scene::PosedScene WireReading::posed(const limn_v1_PosedScene& in) {
   });
   out.light = optional(in.light, &WireReading::light);
   out.finish = text(in.finish);
+  out.cut = optional(in.cut, [](const limn_v1_CutPlane& cut) {
+    return scene::CutPlane{vector(cut.normal), cut.offset_m};
+  });
   return out;
 }
 

@@ -111,6 +111,7 @@ void check(const scene::PosedScene& posed, MessageCheck* to) {
   }
   if (posed.light) check(*posed.light, to);
   to->text("posed.finish", posed.finish);
+  if (posed.cut) to->require(scene::is_plane(*posed.cut), "posed.cut", "a plane with a normal of length 1");
 }
 
 void check(const Track& track, MessageCheck* to) {

@@ -177,6 +177,10 @@ void WireFilling::posed(const scene::PosedScene& in, limn_v1_PosedScene* out) {
   });
   optional(in.light, &out->light, [this](const auto& item, auto* to) { light(item, to); });
   text(in.finish, &out->finish);
+  optional(in.cut, &out->cut, [this](const scene::CutPlane& item, limn_v1_CutPlane* to) {
+    vector(item.normal, &to->normal);
+    to->offset_m = item.offset_m;
+  });
 }
 
 void WireFilling::overlay(const projector::SplitOverlay& in, limn_v1_Overlay* out) {

@@ -18,6 +18,7 @@ enum class ActionId {
   units,
   material,
   finish,
+  section,
   save_look,
   restore_look,
   next_look,

@@ -59,6 +59,13 @@ Result<Switch> read_switch(const Edit& edit) {
   return error("{}: expected on, off or toggle, found '{}'.", edit.action, edit.value);
 }
 
+Result<SectionChange> read_section_change(const Edit& edit) {
+  if (edit.value.empty()) return SectionChange::toggle;
+  if (const auto change = k_section_changes.find(edit.value)) return *change;
+  return error("{}: expected one of {}, found '{}'.", edit.action, listed(k_section_changes.all()),
+               edit.value);
+}
+
 Result<ScreenChoice> read_screen(const Edit& edit) {
   if (edit.value.empty() || edit.value == "next") return ScreenChoice{edit.slot, std::nullopt};
   const std::vector<std::string>& names = screen_names();

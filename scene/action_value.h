@@ -11,6 +11,7 @@
 #include "scene/material_override.h"
 #include "scene/meshes/mesh.h"
 #include "scene/room_light.h"
+#include "scene/section.h"
 #include "scene/show_state.h"
 
 namespace limn::scene {
@@ -56,6 +57,7 @@ using ActionValue = std::variant<std::monostate,
                                  Eigen::Vector3d,
                                  Pose,
                                  Switch,
+                                 SectionChange,
                                  ScreenChoice,
                                  PartUnit,
                                  std::optional<MarkerName>,
@@ -69,6 +71,7 @@ Result<double> read_millimetre(const Edit& edit);            ///< mm
 Result<Eigen::Vector3d> read_millimetres(const Edit& edit);  ///< mm
 Result<Pose> read_place(const Edit& edit);                   ///< m
 Result<Switch> read_switch(const Edit& edit);
+Result<SectionChange> read_section_change(const Edit& edit);
 Result<ScreenChoice> read_screen(const Edit& edit);
 Result<PartUnit> read_part_unit(const Edit& edit);
 Result<std::optional<MarkerName>> read_marker(const Edit& edit);

@@ -118,6 +118,16 @@ Status set_finish(Change* change, const std::string& name) {
   return {};
 }
 
+Status set_section(Change* change, SectionChange wanted) {
+  if (!change->scene.section)
+    return error(
+        "{}: expected a scene with a section, found one without. Add `section` to its scene.json "
+        "(config/README.md).",
+        change->name);
+  change->show_state.section = changed(change->show_state.section, wanted);
+  return {};
+}
+
 std::string unused_look_name(const ShowState& show_state) {
   for (int i = 1;; ++i)
     if (std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
@@ -140,6 +150,8 @@ void take_edits_since(const Scene& scene, const ShowState& show_state, Look* loo
   }
   look->light = show_state.light;
   look->finish = show_state.finish;
+  if (!show_state.section.is_on) look->cut.reset();
+  if (show_state.section.is_held && show_state.section.plane) look->cut = show_state.section.plane;
 }
 
 Status save_look(Change* change, const std::string& name) {
@@ -157,6 +169,7 @@ Status save_look(Change* change, const std::string& name) {
         {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material});
   look.light = posed.light;
   look.finish = posed.finish;
+  if (posed.cut) look.cut = transformed(prototype_from_world, *posed.cut);
   if (!show_state.frozen) take_edits_since(change->scene, show_state, &look);
   if (!look.light) look.light = change->scene.light;
   remember_look(look.name, &show_state);
@@ -396,12 +409,20 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .value = "a finish of the scene",
      .what = "paints the whole prototype in light; empty: not",
      .functions = k_by<read_text, set_finish>},
+    {.id = ActionId::section,
+     .name = "section",
+     .role = work,
+     .argument_kind = maybe_text,
+     .value = "on, off, toggle, hold, release, flip or cover; empty: toggle",
+     .what = "cuts parts open at the plane of the section's marker, or holds the plane",
+     .keys = {Key{'C'}},
+     .functions = k_by<read_section_change, set_section>},
     {.id = ActionId::save_look,
      .name = "save_look",
      .role = work,
      .argument_kind = maybe_text,
      .value = "a name; empty: look-01 and so on",
-     .what = "saves variants, poses, materials, finish and light, as JSON and PNG",
+     .what = "saves variants, poses, materials, finish, light and cut, as JSON and PNG",
      .keys = {Key{'S'}},
      .functions = k_by<read_text, save_look>},
     {.id = ActionId::restore_look,

@@ -125,7 +125,7 @@ bool is_same_prototype(const PosedScene& a, const PosedScene& b) {
 }
 
 bool is_same(const PosedScene& a, const PosedScene& b) {
-  return is_same_prototype(a, b) && a.light == b.light && a.finish == b.finish &&
+  return is_same_prototype(a, b) && a.light == b.light && a.finish == b.finish && a.cut == b.cut &&
          std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
                     [](const PosedPart& p, const PosedPart& q) {
                       return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
@@ -179,11 +179,15 @@ std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed) {
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, ""));
   const ConfigNode root = config.root();
-  root.only({"schema", "world_from_prototype", "slots", "finish"});
+  root.only({"schema", "world_from_prototype", "slots", "finish", "cut"});
   PosedScene out;
   out.viewpoints = fixed_viewpoints(scene);
   if (const auto pose = root.find("world_from_prototype")) out.world_from_prototype = pose->pose();
   if (const auto finish = root.find("finish")) out.finish = finish->choice(finish_names(scene));
+  if (const auto cut = root.find("cut")) {
+    out.cut = read_cut_plane(*cut);
+    if (!scene.section) cut->problem("expected a scene with a section, found one without.");
+  }
   if (const auto slots = root.find("slots")) {
     for (const std::string& name : slots->keys()) {
       if (!scene.find_slot(name))

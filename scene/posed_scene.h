@@ -28,6 +28,8 @@ struct PosedScene {
   std::vector<Viewpoint> viewpoints = {};  ///< Those of fixed viewers and of viewers whose marker is seen.
   std::optional<RoomLight> light = {};     ///< Absent: the scene's own light.
   std::string finish = {};                 ///< The prototype's finish, of Scene::finishes; empty: none.
+  /// The plane that cuts what the scene's section names, in the world; absent: all is whole.
+  std::optional<CutPlane> cut = {};
 };
 
 /// The scene with the poses of the tracks (of `bodies(scene)`). `variants[i]` is the chosen variant of slot i
@@ -42,7 +44,7 @@ PosedScene posed(const Scene& scene,
 /// again, unless parts stick to the surface.
 std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed);
 
-/// Whether both look the same: the same poses, variants, materials, finish and light, to the last bit.
+/// Whether both look the same: the same poses, variants, materials, finish, light and cut, to the last bit.
 bool is_same(const PosedScene& a, const PosedScene& b);
 /// Whether the prototype is at the same pose in both.
 bool is_same_prototype(const PosedScene& a, const PosedScene& b);

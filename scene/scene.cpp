@@ -220,6 +220,38 @@ std::vector<Finish> read_finishes(const ConfigNode& node, const Scene& scene) {
   return finishes;
 }
 
+// The section, and the control that its marker is.
+void read_section_of(const ConfigNode& node, Reader* reader, Scene* scene) {
+  Section section = read_section(node);
+  const ConfigNode marker = node.at("marker");
+  section.marker = read_carrier(marker, reader);
+  if (is_constellation(section.marker))
+    marker.problem("expected a square marker for the section, found a constellation.");
+  for (const Control& control : scene->controls)
+    if (control.marker == section.marker)
+      marker.problem(fmt::format("expected a marker that nothing else uses, found {}, which a control uses.",
+                                 section.marker.text()));
+  for (const Viewer& viewer : scene->viewers)
+    if (viewer.marker == section.marker)
+      marker.problem(fmt::format("expected a marker that nothing else uses, found {}, which a viewer uses.",
+                                 section.marker.text()));
+  std::vector<std::string> names;
+  for (const Slot& slot : scene->slots) names.push_back(slot.name);
+  section.slots = names;
+  if (const auto slots = node.find("slots")) {
+    section.slots.clear();
+    for (const ConfigNode& item : slots->items()) {
+      section.slots.push_back(item.text());
+      if (!scene->find_slot(section.slots.back()))
+        item.problem(fmt::format("expected a slot of the scene ({}), found '{}'.", joined_names(scene->slots),
+                                 section.slots.back()));
+    }
+  }
+  scene->controls.push_back(
+      {section.marker, ActionId::section, "", Gesture::cover, k_section_changes.text(SectionChange::cover)});
+  scene->section = std::move(section);
+}
+
 Imager read_viewer_imager(const ConfigNode& node) {
   node.only({"schema", "world_from_viewer", "size", "fov_deg"});
   const Pose world_from_viewer = node.at("world_from_viewer").pose();
@@ -567,6 +599,9 @@ void leave_out_empty_slots(Scene* scene) {
     return slot && slot->variants.empty();
   });
   std::erase_if(scene->slots, [](const Slot& slot) { return slot.variants.empty(); });
+  if (scene->section)
+    std::erase_if(scene->section->slots,
+                  [&](const std::string& name) { return scene->find_slot(name) == nullptr; });
 }
 
 Result<Scene> load_scene(const fs::path& path,
@@ -583,7 +618,7 @@ Result<Scene> load_scene(const fs::path& path,
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "prototype", "slots", "controls", "viewer", "light", "finishes"});
+  root.only({"schema", "prototype", "slots", "controls", "viewer", "light", "finishes", "section"});
   Scene scene;
   Reader reader;
   scene.folder = config.folder();
@@ -599,6 +634,7 @@ Result<Scene> load_scene(const fs::path& path,
       scene.room_image = read_room_image(*image, scene.light->d_up_world);
   }
   if (const auto node = root.find("finishes")) scene.finishes = read_finishes(*node, scene);
+  if (const auto node = root.find("section")) read_section_of(*node, &reader, &scene);
   LIMN_TRY_STATUS(config.status());
   if (const Status distinct = check_distinct(constellations(scene)); !distinct)
     return error("{}: {}", file.string(), distinct.message());
@@ -654,6 +690,8 @@ std::vector<Body> bodies(const Scene& scene) {
     if (viewer.marker && !viewer.constellation)
       out.push_back({viewer_body(i), {{*viewer.marker, viewer.marker_size_m, Pose()}}});
   }
+  if (const auto& section = scene.section)
+    out.push_back({section_body(), {{section->marker, section->size_m, Pose()}}});
   return out;
 }
 
@@ -681,6 +719,11 @@ double first_marker_size_m(const Scene& scene) {
 }
 
 std::string viewer_body(std::size_t viewer) { return fmt::format("(viewer {})", viewer); }
+
+const std::string& section_body() {
+  static const std::string name = "(section)";
+  return name;
+}
 
 std::string loose_body(const MarkerName& marker) { return "(marker " + marker.text() + ")"; }
 

@@ -17,6 +17,7 @@
 #include "scene/meshes/mesh.h"
 #include "scene/room_image.h"
 #include "scene/room_light.h"
+#include "scene/section.h"
 
 namespace limn::scene {
 
@@ -65,6 +66,7 @@ struct Control {
   ActionId action = ActionId::next_variant;
   std::string slot;
   Gesture gesture = Gesture::cover;
+  std::string value = {};  ///< The value that it sends; only of the control that a section's marker is.
 };
 
 /// A viewer that `view` parts are drawn for: a fixed imager, a person's eye relative to a marker (on glasses,
@@ -88,11 +90,12 @@ struct Scene {
   std::filesystem::path folder;
   std::optional<Prototype> prototype;  ///< Absent: parts are shown over a camera image only.
   std::vector<Slot> slots;
-  std::vector<Control> controls;
+  std::vector<Control> controls;             ///< The last one is the section's marker, if there is a section.
   std::vector<Viewer> viewers;               ///< Several share one viewpoint (scene/viewpoint.h).
   std::vector<Finish> finishes = {};         ///< What the prototype can be painted with in light.
   std::optional<RoomLight> light;            ///< Absent: soft light and a lamp that move with the viewer.
   std::optional<RoomImage> room_image = {};  ///< What RoomLight::image_strength is about.
+  std::optional<Section> section = {};       ///< What cuts parts open.
 
   const Slot* find_slot(const std::string& name) const;
   /// The viewer for a guest's tablet: the one with the guest's name, else the one for every guest. Null when
@@ -141,7 +144,7 @@ std::string units_json(const Slot& slot, const std::string& variant, LengthUnit 
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
 /// The bodies that carry square markers, for the tracker: "prototype", one body per slot, with the slot's
-/// name, and viewer_body(i) for each viewer i with a marker.
+/// name, viewer_body(i) for each viewer i with a marker, and section_body() for the section's marker.
 std::vector<Body> bodies(const Scene& scene);
 /// The bodies that carry balls, with the same names, in their bodies' frames.
 std::vector<Constellation> constellations(const Scene& scene);
@@ -151,6 +154,8 @@ std::vector<std::string> body_names(const Scene& scene);
 double first_marker_size_m(const Scene& scene);
 /// The body's name of a viewer's marker. It differs from every slot's name.
 std::string viewer_body(std::size_t viewer);
+/// The body's name of the section's marker. It differs from every slot's name.
+const std::string& section_body();
 /// The body's name of a marker that carries nothing in the scene. It differs from every slot's name.
 std::string loose_body(const MarkerName& marker);
 bool is_loose_body(const std::string& body);

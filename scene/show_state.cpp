@@ -47,7 +47,10 @@ std::optional<std::string> user_of(const Scene& scene,
   for (const Body& body : bodies(scene)) {
     if (scene.find_slot(body.name)) continue;
     for (const BodyMarker& known : body.markers)
-      if (known.marker == marker) return body.name == "prototype" ? "the prototype" : "a viewer";
+      if (known.marker == marker)
+        return body.name == "prototype"      ? "the prototype"
+               : body.name == section_body() ? "the section"
+                                             : "a viewer";
   }
   for (const Control& control : scene.controls)
     if (control.marker == marker) return "the control of " + std::string(action_of(control.action).name);
@@ -104,6 +107,12 @@ ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) 
   const bool has_finish =
       find_named(scene.finishes, look.finish) != nullptr;  // it may have been removed since
   show_state.finish = has_finish ? look.finish : "";
+  if (look.cut && scene.section) {
+    show_state.section.is_on = show_state.section.is_held = true;
+    show_state.section.plane = look.cut;
+  } else {
+    show_state.section = changed(show_state.section, SectionChange::off);
+  }
   remember_look(look.name, &show_state);
   return show_state;
 }
@@ -208,6 +217,37 @@ ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, st
   return out;
 }
 
+// The plane of a track of the section's marker, in the world.
+CutPlane plane_of(const Section& section, const SectionState& state, const Track& track) {
+  const CutPlane plane = cut_plane(track.world_from_body * section.marker_from_plane);
+  return state.is_flipped ? flipped(plane) : plane;
+}
+
+ShowState with_section_seen(const Scene& scene, ShowState show_state, std::span<const Track> tracks) {
+  SectionState& state = show_state.section;
+  if (!scene.section || !state.is_on || state.is_held) return show_state;
+  const Track* track = find_shown(tracks, section_body());
+  const Track* prototype = find_shown(tracks, "prototype");
+  if (!track || track->tracking != TrackingState::measured || (scene.prototype && !prototype))
+    return show_state;
+  const Pose from_world = prototype ? prototype->world_from_body.inverse() : Pose{};
+  state.plane = transformed(from_world, plane_of(*scene.section, state, *track));
+  return show_state;
+}
+
+// The section's plane in the world.
+std::optional<CutPlane> cut_of(const Scene& scene,
+                               const SectionState& state,
+                               std::span<const Track> tracks,
+                               const std::optional<Pose>& world_from_base) {
+  if (!scene.section || !state.is_on) return std::nullopt;
+  const Track* track = state.is_held ? nullptr : find_shown(tracks, section_body());
+  if (track && seconds_between(track->captured_at, track->at) <= k_section_follows_s)
+    return plane_of(*scene.section, state, *track);
+  if (!state.plane || !world_from_base) return std::nullopt;
+  return transformed(*world_from_base, *state.plane);
+}
+
 PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks) {
   std::vector<std::string> variants;
   for (const ShowState::Slot& slot : show_state.slots) variants.push_back(slot.variant);
@@ -234,6 +274,8 @@ PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::s
         show_state.slots[static_cast<std::size_t>(scene.find_slot(part.slot) - scene.slots.data())].material;
   out.light = show_state.light;
   out.finish = show_state.finish;
+  out.cut =
+      cut_of(scene, show_state.section, tracks, has_base ? std::optional(world_from_base) : std::nullopt);
   return out;
 }
 
@@ -247,13 +289,17 @@ std::string look_json(const Look& look) {
   }
   if (!look.finish.empty()) json["finish"] = look.finish;
   if (look.light) json["light"] = to_json(*look.light);
+  if (look.cut) {
+    const Eigen::Vector3d& n = look.cut->normal;
+    json["cut"] = {{"normal", {n.x(), n.y(), n.z()}}, {"offset_mm", 1e3 * look.cut->offset_m}};
+  }
   return json_text(json, 2) + "\n";
 }
 
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, "limn.look/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "name", "slots", "light", "finish"});
+  root.only({"schema", "name", "slots", "light", "finish", "cut"});
   Look look;
   look.name = root.at("name").text();
   if (!is_look_name(look.name))
@@ -274,6 +320,7 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   }
   if (const auto light = root.find("light")) look.light = read_room_light(*light);
   if (const auto finish = root.find("finish")) look.finish = finish->choice(finish_names(scene));
+  if (const auto cut = root.find("cut")) look.cut = read_cut_plane(*cut);
   LIMN_TRY_STATUS(config.status());
   return look;
 }

@@ -35,6 +35,8 @@ struct Look {
   std::vector<Part> parts;
   std::optional<RoomLight> light = {};  ///< Absent: the scene's own light.
   std::string finish = {};              ///< The prototype's finish; empty: none.
+  /// The plane that cuts parts, in the prototype's frame, as the poses; absent: all is whole.
+  std::optional<CutPlane> cut = {};
 };
 
 /// A part's pose that is held until its marker is moved.
@@ -74,6 +76,7 @@ struct ShowState {
   std::vector<Output> screens = {};  ///< The session's screens, in the order of its devices file.
   std::optional<RoomLight> light;    ///< Light instead of the scene's own.
   std::string finish;                ///< The prototype's finish, of Scene::finishes; empty: none.
+  SectionState section = {};
   Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< Up for `light` if the scene has no light.
   Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< Towards the viewers, for `light`.
   /// A guest for whose tablet `view` parts are drawn; empty: the scene's own viewers.
@@ -89,8 +92,8 @@ std::vector<std::string> look_names(const ShowState& show_state);
 bool is_look_name(const std::string& name);
 /// The look of that name; null when there is none.
 const Look* find_look(const ShowState& show_state, const std::string& name);
-/// The show state with the look's variants, poses, materials, finish and light. The look becomes the one last
-/// shown.
+/// The show state with the look's variants, poses, materials, finish, light and cut, which is held. The look
+/// becomes the one last shown.
 ShowState with_look(const Scene& scene, ShowState show_state, const Look& look);
 /// Makes it the look last shown; the former one becomes `other_look`.
 void remember_look(const std::string& name, ShowState* show_state);
@@ -119,9 +122,17 @@ std::vector<Track> assign_tracks(const Scene& scene,
 /// 5 degrees since it was first seen under the pin. `tracks` come from assign_tracks().
 ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
+/// The show state with the plane of the section where its marker is measured, unless the plane is held.
+/// `tracks` are those at the newest image.
+ShowState with_section_seen(const Scene& scene, ShowState show_state, std::span<const Track> tracks);
+
 /// The scene at a moment, from tracks (of assign_tracks()) and the show state: posed() with the chosen
-/// variants, nudges, pins, materials, finish and light.
+/// variants, nudges, pins, materials, finish and light. The cut follows the section's marker while it is seen
+/// and was within k_section_follows_s; else it is the plane that is held or was seen last.
 PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
+
+/// Seconds after its newest image for which the section's marker is predicted; later its plane stays.
+constexpr double k_section_follows_s = 0.2;
 
 /// The show state that is drawn on the left of the split line: this one with the other look. Nullopt without
 /// a split or another look.

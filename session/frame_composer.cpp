@@ -122,6 +122,8 @@ const FrameDescription& FrameComposer::describe(const FrameInput& input) {
   keep_still(fading_.faded().world_from_prototype, prototype_box_, &frame_.tracks);
   frame_.posed = scene::compose_scene(subject_->scene, show_state, frame_.tracks);
   keep_parts_still(fading_.faded(), subject_->part_boxes, &frame_.posed);
+  if (const auto p_middle = scene::middle_of(subject_->scene, frame_.posed))
+    keep_cut_still(fading_.faded(), *p_middle, &frame_.posed);
   fading_.note(subject_->scene, frame_.posed, show_state, input.times.shown_at);
   frame_.fading = fading_.fading_parts(input.times.shown_at);
   frame_.gone = fading_.gone_scene(input.times.shown_at);

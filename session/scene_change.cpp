@@ -37,8 +37,8 @@ bool have_same_markers(const scene::Scene& a, const scene::Scene& b) {
       text += "\n";
     }
     for (const scene::Control& control : scene.controls)
-      text += fmt::format("{} {} {} {}\n", control.marker.text(), scene::action_of(control.action).name,
-                          control.slot, k_gestures.text(control.gesture));
+      text += fmt::format("{} {} {} {} {}\n", control.marker.text(), scene::action_of(control.action).name,
+                          control.slot, k_gestures.text(control.gesture), control.value);
     return text;
   };
   return carriers(a) == carriers(b);

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 // A turn backwards triggers the opposite of the control's action, if there is one.
 scene::Edit edit_of(const scene::Control& control, int steps) {
   const scene::ActionId backwards = scene::action_of(control.action).opposite.value_or(control.action);
-  return scene::make_edit(steps > 0 ? control.action : backwards, control.slot);
+  return scene::make_edit(steps > 0 ? control.action : backwards, control.slot, control.value);
 }
 
 }  // namespace
@@ -66,10 +66,14 @@ void Session::update_percepts(Percepts percepts, std::size_t moments) {
   percepts_ = std::move(percepts);
   moments_ = moments;
   prediction_ = predicted_at_capture(percepts_, setup_.paint);
-  show_state_ = scene::without_moved_pins(
-      setup_.scene, show_state_, scene::assign_tracks(setup_.scene, show_state_, prediction_.at_capture));
+  const auto tracks = scene::assign_tracks(setup_.scene, show_state_, prediction_.at_capture);
+  show_state_ = scene::without_moved_pins(setup_.scene, show_state_, tracks);
+  show_state_ = scene::with_section_seen(setup_.scene, std::move(show_state_), tracks);
+  section_rest_.note(tracks);
   for (const ControlUse& use : percepts_.uses) {
     const scene::Control& control = setup_.scene.controls[use.control];
+    const auto& section = setup_.scene.section;
+    if (section && control.marker == section->marker && !section_rest_.has_rested()) continue;  // taken away
     const Status done = edit(edit_of(control, use.steps), control.marker.text(), percepts_.captured_at);
     if (!done) log_warning("live: {}: {}", control.marker.text(), done.message());
   }

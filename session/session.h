@@ -19,6 +19,7 @@
 #include "session/recording.h"
 #include "session/recovering_composer.h"
 #include "session/scene_watch.h"
+#include "session/section_rest.h"
 #include "session/show_store.h"
 #include "session/tablet_registry.h"
 #include "session/telemetry.h"
@@ -159,6 +160,7 @@ class Session {
   std::optional<Edited> last_edit_;
   std::vector<std::string> dark_projectors_;
   TabletRegistry tablets_;
+  SectionRest section_rest_;
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

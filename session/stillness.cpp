@@ -50,6 +50,16 @@ void keep_parts_still(const scene::PosedScene& shown,
   }
 }
 
+void keep_cut_still(const scene::PosedScene& shown,
+                    const Eigen::Vector3d& p_middle,
+                    scene::PosedScene* posed) {
+  constexpr double k_reach_m = 0.5;
+  if (!shown.cut || !posed->cut) return;
+  const double turned_m = k_reach_m * (shown.cut->normal - posed->cut->normal).norm();
+  const double shifted_m = std::abs(height_over(*shown.cut, p_middle) - height_over(*posed->cut, p_middle));
+  if (turned_m + shifted_m < k_stays_m) posed->cut = shown.cut;
+}
+
 Pose steadied(std::optional<Pose>* held, std::vector<Track>* tracks) {
   const auto prototype = std::find_if(tracks->begin(), tracks->end(), [](const Track& track) {
     return track.body == "prototype" && track.tracking != TrackingState::lost;

@@ -35,6 +35,12 @@ void keep_parts_still(const scene::PosedScene& shown,
                       const scene::PartBoxes& boxes,
                       scene::PosedScene* posed);
 
+/// Keeps the plane that cuts the parts where it was shown while it would move by less than 0.1 mm within
+/// 0.5 m of a point of the world, the middle of what is shown.
+void keep_cut_still(const scene::PosedScene& shown,
+                    const Eigen::Vector3d& p_middle,
+                    scene::PosedScene* posed);
+
 /// Moves all bodies together so that the prototype is exactly at `held`. If the prototype has really moved
 /// (is_elsewhere), its new pose is held from now on. Returns turned_from_world, the motion that was applied.
 Pose steadied(std::optional<Pose>* held, std::vector<Track>* tracks);

@@ -107,7 +107,8 @@ std::vector<BodyMarker> control_markers(const scene::Scene& scene,
   for (std::size_t i = 0; i < scene.controls.size(); ++i) {
     const double column = static_cast<double>(i) - 0.5 * static_cast<double>(scene.controls.size() - 1);
     const Eigen::Vector3d in_face(3 * k_control_size_m * column, half_height + 1.2 * k_control_size_m, 0);
-    placed.push_back({scene.controls[i].marker, k_control_size_m,
+    const bool is_section = scene.section && scene.controls[i].marker == scene.section->marker;
+    placed.push_back({scene.controls[i].marker, is_section ? scene.section->size_m : k_control_size_m,
                       Pose(prototype_from_face, box.center() + prototype_from_face * in_face)});
   }
   return placed;

@@ -96,6 +96,7 @@ SessionState session_state(const session::Session& session,
   out.outputs = show_state.screens;
   out.finishes = scene::finish_names(scene);
   out.finish = show_state.finish;
+  if (scene.section) out.section = show_state.section;
   out.light = light_text(scene, show_state);
   out.viewer = show_state.viewer;
   out.follows = session.composed().follows;
@@ -142,6 +143,10 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["split_mm"] = state.split_mm;
   out["finishes"] = state.finishes;
   out["finish"] = state.finish;
+  if (state.section)
+    out["section"] = {{"is_on", state.section->is_on},
+                      {"is_held", state.section->is_held},
+                      {"is_flipped", state.section->is_flipped}};
   out["light"] = state.light;
   out["screen"] = state.screen;
   out["screens"] = scene::screen_names();

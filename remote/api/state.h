@@ -37,8 +37,9 @@ struct SessionState {
   std::string look, other_look, deleted_look;
   bool blackout = false, frozen = false, grid = false, marker_states = false, split = false;
   double split_mm = 0;
-  std::vector<std::string> finishes;  ///< Names of the scene's finishes.
-  std::string finish;                 ///< The prototype's; empty: none.
+  std::vector<std::string> finishes;           ///< Names of the scene's finishes.
+  std::string finish;                          ///< The prototype's; empty: none.
+  std::optional<scene::SectionState> section;  ///< Absent: the scene has none.
   std::string light;   ///< In the words of its action; empty: the scene's; `other`: not expressible in them.
   std::string screen;  ///< What was last chosen for all screens.
   std::vector<scene::Output> outputs;

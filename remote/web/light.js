@@ -2,6 +2,7 @@
 import { role_of } from "/actions.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { draw_picture, fetch_picture } from "/pictures.js";
+import { make_section } from "/section.js";
 import { make_finish, make_shading } from "/shading.js";
 import { make_switch } from "/stage.js";
 
@@ -177,7 +178,8 @@ export function make_light(session) {
   const screens = h("div", { class: "choices wrap", role: "group", "aria-label": "What screens show" });
   const outputs = h("div", { class: "stack" });
   const shading = make_shading(session),
-    finish = make_finish(session);
+    finish = make_finish(session),
+    section = make_section(session);
   const viewers = make_viewers(session);
   const projectors = make_projectors(session);
   by_id("light").append(
@@ -195,6 +197,7 @@ export function make_light(session) {
         screens,
         outputs,
       ),
+      section,
       finish,
       shading,
     ),
@@ -204,7 +207,7 @@ export function make_light(session) {
   return {
     opened: (name) => projectors.opened(name),
     show(state) {
-      for (const part of [grid, rings, split, viewers, finish, shading, projectors]) part.show(state);
+      for (const part of [grid, rings, split, viewers, section, finish, shading, projectors]) part.show(state);
       keep(
         screens,
         state.screens,

@@ -63,8 +63,12 @@ void fields(F& f, scene::RoomLight& x) {
   f(x.d_up_world), f(x.below_rgb), f(x.above_rgb), f(x.lamps), f(x.image_strength);
 }
 template <class F>
+void fields(F& f, scene::CutPlane& x) {
+  f.direction(x.normal), f(x.offset_m);
+}
+template <class F>
 void fields(F& f, scene::PosedScene& x) {
-  f(x.world_from_prototype), f(x.parts), f(x.viewpoints), f(x.light), f(x.finish);
+  f(x.world_from_prototype), f(x.parts), f(x.viewpoints), f(x.light), f(x.finish), f(x.cut);
 }
 template <class F>
 void fields(F& f, session::FadingPart& x) {

@@ -25,6 +25,7 @@ Scene a_scene() {
   }
   scene.finishes.emplace_back();
   scene.finishes[0].name = "sand";
+  scene.section = Section{.marker = {"aruco_4x4_50", "8"}, .size_m = 0.04, .slots = {"mirror"}};
   scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{LengthUnit::metre}});
   return scene;
 }
@@ -56,7 +57,8 @@ std::string text_of(const Pose& pose) {
 // All members of a show state, as text. A new member causes a compiler error until it is added here, too.
 std::map<std::string, std::string> members_of(const ShowState& show_state) {
   const auto& [slots, looks, look, other_look, deleted_look, blackout, frozen, marker_states, grid, split,
-               split_mm, screen, screens, light, finish, d_up_world, d_front_world, viewer] = show_state;
+               split_mm, screen, screens, light, finish, section, d_up_world, d_front_world, viewer] =
+      show_state;
   std::map<std::string, std::string> all = {
       {"look", look},
       {"other_look", other_look},
@@ -72,6 +74,8 @@ std::map<std::string, std::string> members_of(const ShowState& show_state) {
       {"d_up_world", text_of(Pose(Eigen::Quaterniond::Identity(), d_up_world))},
       {"d_front_world", text_of(Pose(Eigen::Quaterniond::Identity(), d_front_world))},
       {"finish", finish},
+      {"section", fmt::format("{} {} {} {}", section.is_on, section.is_held, section.is_flipped,
+                              look_json({.name = "", .cut = section.plane}))},
       {"viewer", viewer}};
   for (const Look& each : looks) all["looks"] += look_json(each);
   for (const Output& each : screens)
@@ -160,6 +164,10 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
                   }};
     case ActionId::finish:
       return Case{usual, "sand", {"finish"}, [](const ShowState& s) { return s.finish == "sand"; }};
+    case ActionId::section:
+      return Case{usual, "hold", {"section"}, [](const ShowState& s) {
+                    return s.section.is_on && s.section.is_held;
+                  }};
     case ActionId::save_look:
       return Case{usual, "new", {"looks", "look", "other_look"}, [](const ShowState& s) {
                     return s.looks.size() == 4 && s.looks[3].name == "new" && s.look == "new" &&
