@@ -136,6 +136,9 @@ scene::PosedPart WireReading::part(const limn_v1_PosedPart& in) {
   out.material.base_colour = optional(in.material.base_colour, &WireReading::vector);
   out.material.metallic = optional(in.material.metallic, number);
   out.material.roughness = optional(in.material.roughness, number);
+  out.window = optional(in.window, [](const limn_v1_GreyWindow& window) {
+    return scene::GreyWindow{window.level, window.width};
+  });
   return out;
 }
 

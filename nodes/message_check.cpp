@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "nodes/packed_image.h"
+#include "scene/volume_part.h"
 
 namespace limn::nodes {
 namespace {
@@ -96,6 +97,8 @@ void check(const scene::PosedPart& part, MessageCheck* to) {
   to->text("part.variant", part.variant);
   to->pose("part", part.world_from_part);
   if (part.material.base_colour) to->finite_matrix("part.material", *part.material.base_colour);
+  if (part.window)
+    to->require(scene::is_window(*part.window), "part.window", "a finite level and a width above 0");
   to->finite("part.material", {part.material.metallic.value_or(0), part.material.roughness.value_or(0)});
 }
 

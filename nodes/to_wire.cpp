@@ -154,6 +154,10 @@ void WireFilling::part(const scene::PosedPart& in, limn_v1_PosedPart* out) {
   const auto number = [](double value, double* to) { *to = value; };
   optional(in.material.metallic, &out->material.metallic, number);
   optional(in.material.roughness, &out->material.roughness, number);
+  optional(in.window, &out->window, [](const scene::GreyWindow& window, limn_v1_GreyWindow* to) {
+    to->level = window.level;
+    to->width = window.width;
+  });
 }
 
 void WireFilling::light(const scene::RoomLight& in, limn_v1_RoomLight* out) {

@@ -17,6 +17,7 @@ enum class ActionId {
   unpair,
   units,
   material,
+  window,
   finish,
   section,
   save_look,

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "scene/command_text.h"
+#include "scene/volume_part.h"
 
 namespace limn::scene {
 namespace {
@@ -93,6 +94,8 @@ Result<std::optional<MarkerName>> read_marker(const Edit& edit) {
 }
 
 Result<MaterialOverride> read_material(const Edit& edit) { return parse_material_override(edit.value); }
+
+Result<std::optional<GreyWindow>> read_window(const Edit& edit) { return parse_grey_window(edit.value); }
 
 Result<std::optional<LightNumbers>> read_light(const Edit& edit) {
   if (edit.value.empty()) return std::optional<LightNumbers>();

@@ -62,6 +62,7 @@ using ActionValue = std::variant<std::monostate,
                                  PartUnit,
                                  std::optional<MarkerName>,
                                  MaterialOverride,
+                                 std::optional<GreyWindow>,
                                  std::optional<LightNumbers>>;
 
 // Readers of an edit's value, one for each type. Errors name the action, what it expects and what was found.
@@ -76,6 +77,7 @@ Result<ScreenChoice> read_screen(const Edit& edit);
 Result<PartUnit> read_part_unit(const Edit& edit);
 Result<std::optional<MarkerName>> read_marker(const Edit& edit);
 Result<MaterialOverride> read_material(const Edit& edit);
+Result<std::optional<GreyWindow>> read_window(const Edit& edit);
 Result<std::optional<LightNumbers>> read_light(const Edit& edit);
 
 }  // namespace limn::scene

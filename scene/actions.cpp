@@ -109,6 +109,15 @@ Status set_material(Change* change, const MaterialOverride& material) {
   return {};
 }
 
+Status set_window(Change* change, const std::optional<GreyWindow>& window) {
+  const std::vector<Variant>& variants = change->slot().variants;
+  if (std::none_of(variants.begin(), variants.end(), [](const Variant& v) { return v.volume != nullptr; }))
+    return error("{}: expected a slot with a volume (NIfTI, DICOM), found slot '{}' with meshes only.",
+                 change->name, change->slot().name);
+  change->chosen().window = window;
+  return {};
+}
+
 Status set_finish(Change* change, const std::string& name) {
   const std::vector<std::string> names = finish_names(change->scene);
   if (!name.empty() && std::find(names.begin(), names.end(), name) == names.end())
@@ -146,6 +155,7 @@ void take_edits_since(const Scene& scene, const ShowState& show_state, Look* loo
     }
     part->variant = slot.variant;
     part->material = slot.material;
+    part->window = slot.window;
     if (slot.pin) part->prototype_from_part = slot.pin->prototype_from_part;
   }
   look->light = show_state.light;
@@ -166,7 +176,7 @@ Status save_look(Change* change, const std::string& name) {
       posed.world_from_prototype ? posed.world_from_prototype->inverse() : Pose{};
   for (const PosedPart& part : posed.parts)
     look.parts.push_back(
-        {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material});
+        {part.slot, part.variant, prototype_from_world * part.world_from_part, part.material, part.window});
   look.light = posed.light;
   look.finish = posed.finish;
   if (posed.cut) look.cut = transformed(prototype_from_world, *posed.cut);
@@ -402,6 +412,14 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .value = "a colour, metalness, roughness, - for the file's: #c02818 0 0.4",
      .what = "sets the material of all of the part's variants; empty: the file's materials",
      .functions = k_by<read_material, set_material>},
+    {.id = ActionId::window,
+     .name = "window",
+     .role = work,
+     .of_slot = true,
+     .argument_kind = maybe_text,
+     .value = "a width and a level: 400 40",
+     .what = "sets which values of the slot's volumes are black and white; empty: as their files say",
+     .functions = k_by<read_window, set_window>},
     {.id = ActionId::finish,
      .name = "finish",
      .role = work,
@@ -422,7 +440,7 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .role = work,
      .argument_kind = maybe_text,
      .value = "a name; empty: look-01 and so on",
-     .what = "saves variants, poses, materials, finish, light and cut, as JSON and PNG",
+     .what = "saves variants, poses, materials, windows, finish, light and cut, as JSON and PNG",
      .keys = {Key{'S'}},
      .functions = k_by<read_text, save_look>},
     {.id = ActionId::restore_look,

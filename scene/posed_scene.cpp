@@ -128,7 +128,7 @@ bool is_same(const PosedScene& a, const PosedScene& b) {
   return is_same_prototype(a, b) && a.light == b.light && a.finish == b.finish && a.cut == b.cut &&
          std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
                     [](const PosedPart& p, const PosedPart& q) {
-                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
+                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material && p.window == q.window &&
                              limn::is_same(p.world_from_part, q.world_from_part);
                     });
 }

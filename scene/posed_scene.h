@@ -18,6 +18,7 @@ struct PosedPart {
   std::string variant;
   Pose world_from_part;
   MaterialOverride material = {};
+  std::optional<GreyWindow> window = {};  ///< How its volume is shown; absent: as the scene or its file says.
 };
 
 /// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen, or

@@ -21,6 +21,8 @@
 #include "scene/meshes/mesh_loading.h"
 #include "scene/scene_loading.h"
 #include "scene/slot_folder.h"
+#include "scene/volume_part.h"
+#include "scene/volumes/volume_name.h"
 
 namespace limn::scene {
 namespace {
@@ -32,6 +34,10 @@ struct MeshFile {
   std::string where;
   fs::path path;
   std::optional<LengthUnit> units;  // absent: the file's own
+  // A volume instead of a mesh, its size as a multiple of the file's, and its window.
+  bool is_volume = false;
+  double scale = 1;
+  std::optional<GreyWindow> window = {};
 };
 
 struct Reader {
@@ -80,6 +86,22 @@ MeshFile read_mesh_file(const ConfigNode& node) {
   const ConfigNode mesh = node.at("mesh");
   MeshFile file{mesh.where(), mesh.path_inside(), {}};
   if (node.find("units") || !states_unit(file.path)) file.units = k_length_units.read(node.at("units"));
+  return file;
+}
+
+// A part's mesh or volume.
+MeshFile read_part_file(const ConfigNode& node) {
+  constexpr double k_largest_scale = 1e6;  // a cell as large as a person
+  const auto volume = node.find("volume");
+  if (volume && node.find("mesh")) volume->problem("expected either \"mesh\" or \"volume\", found both.");
+  for (const char* key : {"units", "scale", "window"})
+    if (const auto other = node.find(key); other && (key == std::string("units")) == volume.has_value())
+      other->problem(volume ? "expected no unit beside a volume, whose file states it. Remove it."
+                            : "expected it beside \"volume\" only. Remove it.");
+  if (!volume) return read_mesh_file(node);
+  MeshFile file{volume->where(), volume->path_inside(), {}, true};
+  if (const auto scale = node.find("scale")) file.scale = scale->positive(k_largest_scale);
+  if (const auto window = node.find("window")) file.window = read_grey_window(*window);
   return file;
 }
 
@@ -137,12 +159,12 @@ Prototype read_prototype(const ConfigNode& node, Reader* reader) {
 void read_variants(const ConfigNode& node, Slot* slot, Reader* reader) {
   std::set<std::string> names;
   for (const ConfigNode& item : node.items()) {
-    item.only({"name", "mesh", "units"});
+    item.only({"name", "mesh", "units", "volume", "scale", "window"});
     Variant variant{item.at("name").text(), {}};
     if (!names.insert(variant.name).second) {
       item.at("name").problem(fmt::format("expected a unique name, found '{}' twice.", variant.name));
     }
-    reader->part_meshes.push_back(read_mesh_file(item));
+    reader->part_meshes.push_back(read_part_file(item));
     slot->variants.push_back(std::move(variant));
   }
   if (slot->variants.empty()) node.problem("expected at least one variant, found none.");
@@ -347,11 +369,22 @@ Status check_size(const Mesh& mesh, std::optional<LengthUnit> given) {
       likely.empty() ? "Check the mesh's size and unit." : "Is its unit " + joined_names(likely) + "?");
 }
 
+// A variant that shows a volume.
+Result<Variant> load_volume_variant(const std::string& name, const MeshFile& file) {
+  LIMN_TRY(Volume volume, load_volume(file.path));
+  Variant variant{name, {}};
+  variant.volume = std::make_shared<const Volume>(scaled(std::move(volume), file.scale));
+  variant.mesh = volume_box(*variant.volume);
+  variant.window = file.window;
+  return variant;
+}
+
 const Mesh& mesh_of(const Mesh& mesh) { return mesh; }
+const Mesh& mesh_of(const Variant& variant) { return variant.mesh; }
 const Mesh& mesh_of(const MeshWithVariants& meshes) { return meshes.mesh; }
 
-// What was loaded from a file that the scene names (Mesh or MeshWithVariants), if it has the size of an
-// object.
+// What was loaded from a file that the scene names (Mesh, MeshWithVariants or Variant), if it has the size of
+// an object.
 template <class Loaded>
 Result<Loaded> checked(Result<Loaded> loaded, const MeshFile& file, const fs::path& scene_path) {
   if (!loaded) return error("{}: {}: {}", scene_path.string(), file.where, loaded.message());
@@ -435,7 +468,7 @@ Result<FileVariants> auto_import_mesh(const fs::path& file,
                                       std::span<const Variant> variants,
                                       const std::map<std::string, LengthUnit>& known_units,
                                       const std::stop_token& stop) {
-  const std::string name = file.stem().string();
+  const std::string name = is_volume(file) ? volume_stem(file) : file.stem().string();
   if (!is_utf8(name))
     return error("{}: expected a file name in UTF-8, found other bytes. Rename the file.",
                  as_utf8(file.string()));
@@ -443,6 +476,12 @@ Result<FileVariants> auto_import_mesh(const fs::path& file,
     return error(
         "{}: expected a file name that no other variant of slot '{}' has, found '{}' twice. Rename the file.",
         file.string(), slot.name, name);
+  if (is_volume(file)) {
+    LIMN_TRY(Variant volume, load_volume_variant(name, {"", file, {}, true}));
+    if (const Status size = check_size(volume.mesh, {}); !size)
+      return error("{}: {}", file.string(), size.message());
+    return FileVariants{std::move(volume), {}};
+  }
   const auto known = known_units.find(name);
   Variant::AutoImported import{std::nullopt, false};
   if (known != known_units.end()) import.units = known->second;
@@ -494,6 +533,14 @@ Status load_variants(std::span<const MeshFile> listed,
   std::vector<Variant> variants;
   for (std::size_t i = 0; i < listed.size(); ++i) {
     const std::string& name = slot->variants[i].name;
+    if (listed[i].is_volume) {
+      auto volume = checked(load_volume_variant(name, listed[i]), listed[i], path);
+      if (volume)
+        variants.push_back(std::move(*volume));
+      else
+        left_out->variants.push_back({slot->name, name, volume.message(), i == 0});
+      continue;
+    }
     auto meshes = checked(load_mesh_with_variants(listed[i].path, listed[i].units, stop), listed[i], path);
     if (!meshes) {
       left_out->variants.push_back({slot->name, name, meshes.message(), i == 0});
@@ -508,7 +555,8 @@ Status load_variants(std::span<const MeshFile> listed,
   for (const fs::path& file : files.meshes) {
     auto found = auto_import_mesh(file, *slot, variants, known_units, stop);
     if (!found) {
-      left_out->variants.push_back({slot->name, as_utf8(file.stem().string()), found.message()});
+      left_out->variants.push_back(
+          {slot->name, as_utf8(is_volume(file) ? volume_stem(file) : file.stem().string()), found.message()});
       continue;
     }
     const std::string name = found->first.name;
@@ -526,11 +574,13 @@ Status load_variants(std::span<const MeshFile> listed,
 void find_strays(const Scene& scene, LeftOut* left_out) {
   const fs::path slots = scene.folder / "slots";
   const std::string names = joined_names(scene.slots);
-  for (const fs::path& mesh : list_slot_folder(slots).meshes)
+  for (const fs::path& mesh : list_slot_folder(slots).meshes) {
+    if (std::error_code none; fs::is_directory(mesh, none)) continue;  // a slot's folder with slices in it
     left_out->others.push_back(
         {"(none)", as_utf8(mesh.filename().string()),
          fmt::format("{}: expected meshes in a slot's folder ({}), found one beside them. Move it there.",
                      as_utf8(mesh.string()), names)});
+  }
   for (const SlotFolder::Other& other : list_slot_folder(slots).others)
     if (std::error_code none;
         fs::is_directory(other.path, none) && !scene.find_slot(other.path.filename().string()))

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <string>
@@ -18,6 +19,7 @@
 #include "scene/room_image.h"
 #include "scene/room_light.h"
 #include "scene/section.h"
+#include "scene/volumes/volume.h"
 
 namespace limn::scene {
 
@@ -46,6 +48,9 @@ struct Variant {
   std::optional<AutoImported> auto_imported = {};
   /// Where it is the same file with other materials: the name of the variant with the file's default ones.
   std::string default_variant = {};
+  /// The values that are shown where a plane cuts the part; then `mesh` is the box around them. Null: none.
+  std::shared_ptr<const Volume> volume = {};
+  std::optional<GreyWindow> window = {};  ///< How they are shown; absent: as their file says.
 };
 
 /// A place for one part, carried by one marker or constellation.
@@ -117,8 +122,8 @@ std::string to_text(const SkippedVariant& skipped);
 /// Whether slots of which no variant can be loaded stay in the scene.
 enum class EmptySlots { left_out, kept };
 
-/// Reads a scene; `path` is the scene.json or its folder. Meshes in slots/NAME/ of the folder become variants
-/// of slot NAME, named after their files. The material variants of a file (KHR_materials_variants) become
+/// Reads a scene; `path` is the scene.json or its folder. Meshes and volumes in slots/NAME/ of the folder become
+/// variants of slot NAME, named after their files. The material variants of a file (KHR_materials_variants) become
 /// variants, too, named "NAME VARIANT"; NAME itself has the file's default materials. Their units are those
 /// of slots/NAME/units.json (limn.units/1), or those that the files state, or are guessed, with a message. A
 /// variant that cannot be loaded is an error. With `skipped_variants` it is instead left out and listed

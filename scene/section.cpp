@@ -8,6 +8,7 @@
 namespace limn::scene {
 namespace {
 
+constexpr double k_largest_card_m = 2;
 constexpr double k_largest_hatch_mm = 1000, k_largest_offset_mm = 1e5;
 constexpr double k_unit = 1e-6;  // largest error of a unit normal's length
 
@@ -48,12 +49,21 @@ Eigen::Vector3d across_hatch(const Eigen::Vector3d& normal_part, int owner) {
 }
 
 Section read_section(const ConfigNode& node) {
-  node.only({"marker", "size_mm", "marker_from_plane", "slots", "cuts_prototype", "hatch_mm", "cap_colour"});
+  node.only({"marker", "size_mm", "marker_from_plane", "slots", "cuts_prototype", "hatch_mm", "cap_colour",
+             "card_mm"});
   Section section;
   section.size_m = 1e-3 * node.at("size_mm").positive(k_largest_marker_mm);
   if (const auto pose = node.find("marker_from_plane")) section.marker_from_plane = pose->pose();
   if (const auto cuts = node.find("cuts_prototype")) section.cuts_prototype = cuts->boolean();
   if (const auto hatch = node.find("hatch_mm")) section.hatch_m = 1e-3 * hatch->positive(k_largest_hatch_mm);
+  if (const auto card = node.find("card_mm")) {
+    const std::vector<double> size_mm = card->numbers(2);
+    if (size_mm.size() == 2) section.card_size_m = 1e-3 * Eigen::Vector2d(size_mm[0], size_mm[1]);
+    if (section.card_size_m &&
+        !(section.card_size_m->minCoeff() > 0 && section.card_size_m->maxCoeff() <= k_largest_card_m))
+      card->problem(
+          fmt::format("expected a width and a height above 0 and at most {} mm.", 1e3 * k_largest_card_m));
+  }
   if (const auto colour = node.find("cap_colour")) {
     section.cap_colour = colour->vector3();
     if (section.cap_colour.minCoeff() < 0 || section.cap_colour.maxCoeff() > 1)

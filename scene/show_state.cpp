@@ -11,6 +11,7 @@
 #include "core/names.h"
 #include "scene/actions.h"
 #include "scene/command_text.h"
+#include "scene/volume_part.h"
 
 namespace limn::scene {
 namespace {
@@ -101,6 +102,7 @@ ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) 
       show_state.slots[i].variant = part.variant;
       show_state.slots[i].pin = Pin{part.prototype_from_part, std::nullopt};
       show_state.slots[i].material = part.material;
+      show_state.slots[i].window = part.window;
     }
   }
   show_state.light = look.light;
@@ -269,9 +271,12 @@ PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::s
       part->world_from_part = part->world_from_part * Pose(Eigen::Quaterniond::Identity(), slot.nudge);
     }
   }
-  for (PosedPart& part : out.parts)
-    part.material =
-        show_state.slots[static_cast<std::size_t>(scene.find_slot(part.slot) - scene.slots.data())].material;
+  for (PosedPart& part : out.parts) {
+    const ShowState::Slot& chosen =
+        show_state.slots[static_cast<std::size_t>(scene.find_slot(part.slot) - scene.slots.data())];
+    part.material = chosen.material;
+    part.window = chosen.window;
+  }
   out.light = show_state.light;
   out.finish = show_state.finish;
   out.cut =
@@ -286,6 +291,7 @@ std::string look_json(const Look& look) {
     nlohmann::ordered_json& slot = json["slots"][part.slot];
     slot = {{"variant", part.variant}, {"prototype_from_part", to_json(part.prototype_from_part)}};
     if (!part.material.is_none()) slot["material"] = to_json(part.material);
+    if (part.window) slot["window"] = to_json(*part.window);
   }
   if (!look.finish.empty()) json["finish"] = look.finish;
   if (look.light) json["light"] = to_json(*look.light);
@@ -307,7 +313,7 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   const ConfigNode slots = root.at("slots");
   for (const std::string& name : slots.keys()) {
     const ConfigNode node = slots.at(name);
-    node.only({"variant", "prototype_from_part", "material"});
+    node.only({"variant", "prototype_from_part", "material", "window"});
     const Slot* slot = scene.find_slot(name);
     if (!slot) {
       node.problem("expected a slot of the scene, found another name.");
@@ -317,6 +323,7 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
         {name, node.at("variant").choice(variant_names(*slot)), node.at("prototype_from_part").pose()});
     if (const auto material = node.find("material"))
       look.parts.back().material = read_material_override(*material);
+    if (const auto window = node.find("window")) look.parts.back().window = read_grey_window(*window);
   }
   if (const auto light = root.find("light")) look.light = read_room_light(*light);
   if (const auto finish = root.find("finish")) look.finish = finish->choice(finish_names(scene));

@@ -30,6 +30,7 @@ struct Look {
     std::string variant;
     Pose prototype_from_part;  ///< In a scene without a prototype: world_from_part.
     MaterialOverride material = {};
+    std::optional<GreyWindow> window = {};  ///< How a volume is shown; absent: as the scene or its file says.
   };
   std::string name;
   std::vector<Part> parts;
@@ -60,6 +61,7 @@ struct ShowState {
     std::optional<Pin> pin;
     std::optional<MarkerName> marker;  ///< Marker that carries the part instead of the scene's own.
     MaterialOverride material = {};    ///< Applies to all variants of the slot.
+    std::optional<GreyWindow> window = {};  ///< Applies to all volumes of the slot; absent: each has its own.
   };
   std::vector<Slot> slots;  ///< In the scene's order.
   std::vector<Look> looks;

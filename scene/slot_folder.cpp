@@ -8,6 +8,7 @@
 
 #include "core/utf8.h"
 #include "scene/meshes/mesh_content.h"
+#include "scene/volumes/volume_name.h"
 
 namespace limn::scene {
 namespace {
@@ -40,6 +41,8 @@ std::string reason(const std::string& end) {
          {".usd", ".usda", ".usdc", ".wrl", ".x3d", ".dxf", ".ifc",     ".abc",  ".vtk", ".pcd",  ".xyz",
           ".las", ".e57",  ".ase",  ".lws", ".b3d", ".md2", ".md5mesh", ".ms3d", ".wrz", ".vrml", ".gcode"})
       all[e] = "Limn does not read this format." + mesh;
+    for (const char* e : {".dcm", ".ima"})
+      all[e] = "it is a DICOM slice. Put the slices of a series into a folder of their own here.";
     return all;
   }();
   const auto known = k_reasons.find(end);
@@ -62,6 +65,8 @@ bool holds_a_mesh(const fs::path& folder) {
 
 }  // namespace
 
+bool is_volume(const fs::path& path) { return is_volume_name(path) || is_dicom_folder(path); }
+
 SlotFolder list_slot_folder(const fs::path& folder) {
   SlotFolder out;
   std::error_code none;
@@ -72,10 +77,12 @@ SlotFolder list_slot_folder(const fs::path& folder) {
       continue;
     std::error_code gone;
     if (entry.is_directory(gone)) {
-      if (holds_a_mesh(path))
+      if (is_dicom_folder(path))
+        out.meshes.push_back(path);
+      else if (holds_a_mesh(path))
         out.others.push_back(
             {path, "it is a folder. Put the mesh and its textures into the slot's folder itself."});
-    } else if (is_mesh_name(path)) {
+    } else if (is_mesh_name(path) || is_volume_name(path)) {
       out.meshes.push_back(path);
     } else if (!is_beside_a_mesh(end)) {
       out.others.push_back({path, reason(end)});

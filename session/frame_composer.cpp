@@ -7,6 +7,7 @@
 
 #include "core/names.h"
 #include "projector/overlays/marker_signs.h"
+#include "session/drawing/card_slice.h"
 #include "session/stillness.h"
 
 namespace limn::session {
@@ -179,7 +180,7 @@ void FrameComposer::select_viewpoint(const FrameInput& input) {
   composed_.p_guest_eye_world = selected.p_guest_eye_world;
 }
 
-// The split view (another look left of a line) and the grid.
+// The split view (another look left of a line), the grid, and slices on the section's card.
 std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
   std::vector<projector::Overlay> out;
   if (!frame_.posed.world_from_prototype || show_state.blackout) return out;
@@ -187,6 +188,16 @@ std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::Sho
     out.push_back(projector::SplitOverlay{scene::compose_scene(subject_->scene, *left, frame_.tracks),
                                           prototype_box_.center().x() + 1e-3 * show_state.split_mm});
   if (show_state.grid) out.push_back(projector::GridOverlay{});
+  const auto& section = subject_->scene.section;
+  const auto card = std::ranges::find(frame_.tracks, scene::section_body(), &Track::body);
+  if (section && show_state.section.is_on && card != frame_.tracks.end() &&
+      card->tracking != TrackingState::lost) {
+    const Pose world_from_card = card->world_from_body * section->marker_from_plane;
+    if (const auto projector = best_projector(world_from_card))
+      for (projector::Overlay& sign : card_overlays(subject_->scene, frame_.posed, world_from_card,
+                                                    *projector, subject_->rig.projectors.size()))
+        out.push_back(std::move(sign));
+  }
   return out;
 }
 

@@ -93,7 +93,8 @@ void draw_pairing_overlay(const cv::Mat& sign,
                           0, k_sign_finer, 0.5 * (k_sign_finer - 1),                            //
                           0, 0, 1);
   cv::Mat cover(sign.size(), CV_8U, cv::Scalar(255)), drawn, share;
-  cv::warpPerspective(sign, drawn, larger * turn, box.size() * k_sign_finer, cv::INTER_LINEAR);
+  cv::warpPerspective(sign, drawn, larger * turn, box.size() * k_sign_finer, cv::INTER_LINEAR,
+                      cv::BORDER_REPLICATE);  // else the edge fades, also between signs side by side
   cv::warpPerspective(cover, share, larger * turn, box.size() * k_sign_finer, cv::INTER_NEAREST);
   cv::resize(drawn, drawn, box.size(), 0, 0, cv::INTER_AREA);
   cv::resize(share, share, box.size(), 0, 0, cv::INTER_AREA);

@@ -7,6 +7,7 @@
 
 #include "core/config.h"
 #include "scene/command_text.h"
+#include "scene/volume_part.h"
 
 namespace limn::remote {
 namespace {
@@ -32,6 +33,8 @@ SessionState::Slot slot_state(const session::Session& session, std::size_t index
   for (const scene::Variant& variant : slot.variants) {
     out.variants.push_back(variant.name);
     if (variant.auto_imported) out.dropped.push_back(variant.name);
+    if (variant.volume && variant.name == staged.variant)
+      out.volume = {variant.volume->least, variant.volume->most, scene::shown_window(variant, staged.window)};
   }
   out.nudge_mm = 1e3 * staged.nudge;
   out.is_held = staged.pin || !staged.nudge.isZero();
@@ -67,6 +70,10 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
       {"marker", slot.marker},
       {"material", slot.material},
       {"dropped", slot.dropped}};
+  if (slot.volume)
+    out["volume"] = {{"least", slot.volume->least},
+                     {"most", slot.volume->most},
+                     {"window", scene::format_grey_window(slot.volume->window)}};
   if (slot.prototype_from_part) out["prototype_from_part"] = limn::to_json(*slot.prototype_from_part);
   return out;
 }

@@ -23,6 +23,12 @@ struct SessionState {
     bool is_held = false;
     std::string tracking;  ///< "seen", "carried on" or "lost".
     std::string marker;
+    /// What the shown variant's volume holds; absent: the variant is a mesh.
+    struct Volume {
+      float least = 0, most = 0;
+      scene::GreyWindow window;  ///< As it is shown.
+    };
+    std::optional<Volume> volume = {};
     std::string material;                     ///< In the words of its action; empty: the file's material.
     std::vector<std::string> dropped;         ///< Variants whose unit can be chosen.
     std::optional<Pose> prototype_from_part;  ///< nullopt: the part is not shown.

@@ -2,7 +2,7 @@
 import { make_comments } from "/comments.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { show_picture } from "/pictures.js";
-import { make_material } from "/shading.js";
+import { make_material, make_window } from "/shading.js";
 
 const k_steps_mm = ["0.1", "1", "5"];
 const k_units = ["mm", "cm", "m", "in", "ft"];
@@ -238,6 +238,7 @@ function make_slot(session, slot) {
     make_nudge(session, slot),
     make_place(session, slot),
     make_material(session, slot),
+    make_window(session, slot),
     make_marker(session, slot),
     make_units(session, slot),
   ];

@@ -1,4 +1,4 @@
-// Material of parts, finish of the prototype, and room light: sliders that act when they are released.
+// Material of parts, window of volumes, finish of the prototype, and room light: sliders that act when they are released.
 import { h } from "/dom.js";
 
 function slider(label, properties) {
@@ -47,6 +47,33 @@ export function make_material(session, slot) {
     session.button("material", { slot: slot.name, class: "wide" }, "Use the file's material"),
   );
   node.show = (state_of) => follow(state_of.material);
+  return node;
+}
+
+/** Controls for the window of a part's volume: which values are black and white. Hidden for a mesh. */
+export function make_window(session, slot) {
+  const number = (label, title) => slider(`${label} of ${slot.name}`, { title, min: "0", max: "1", step: "any", value: "0" });
+  const level = number("Level", "Level"),
+    width = number("Width", "Width");
+  const follow = let_go([width.input, level.input], () =>
+    session.act("window", slot.name, `${Number(width.input.value)} ${Number(level.input.value)}`),
+  );
+  const node = h(
+    "div",
+    { class: "stack", "data-needs": "work", hidden: true },
+    h("h3", {}, "Window"),
+    level.row,
+    width.row,
+    session.button("window", { slot: slot.name, class: "wide" }, "Use the file's window"),
+  );
+  node.show = ({ volume }) => {
+    node.hidden = !volume;
+    if (!volume) return;
+    const range = volume.most - volume.least || 1;
+    Object.assign(level.input, { min: volume.least, max: volume.most });
+    Object.assign(width.input, { min: range / 1000, max: range });
+    follow(volume.window);
+  };
   return node;
 }
 

@@ -42,7 +42,7 @@ const std::map<std::string, Names>& allowed() {
       {"calib", {"core", "scene", "scene/meshes"}},
       {"tracker", {"core"}},
       {"projector", {"core", "scene", "scene/meshes"}},
-      {"sim", {"core", "scene", "scene/meshes", "device"}},
+      {"sim", {"core", "scene", "scene/meshes", "scene/volumes", "device"}},
       {"device/gui", {"core", "device"}},
       {"exchange", {"core", "scene/files", "scene", "scene/meshes", "projector", "exchange/curves"}},
       {"exchange/cad", {"core", "scene/files", "exchange/curves"}},

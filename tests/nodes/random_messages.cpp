@@ -47,8 +47,14 @@ void fields(F& f, scene::MaterialOverride& x) {
   f(x.base_colour), f(x.metallic), f(x.roughness);
 }
 template <class F>
+void fields(F& f, scene::GreyWindow& x) {
+  f(x.level), f(x.width);
+  x.level = std::remainder(x.level, 1e6);
+  x.width = std::max(1.0, std::abs(std::remainder(x.width, 1e6)));  // above 0
+}
+template <class F>
 void fields(F& f, scene::PosedPart& x) {
-  f(x.slot), f(x.variant), f(x.world_from_part), f(x.material);
+  f(x.slot), f(x.variant), f(x.world_from_part), f(x.material), f(x.window);
 }
 template <class F>
 void fields(F& f, scene::Viewpoint& x) {

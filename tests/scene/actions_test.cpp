@@ -26,6 +26,7 @@ Scene a_scene() {
   scene.finishes.emplace_back();
   scene.finishes[0].name = "sand";
   scene.section = Section{.marker = {"aruco_4x4_50", "8"}, .size_m = 0.04, .slots = {"mirror"}};
+  scene.slots[0].variants[0].volume = std::make_shared<Volume>();
   scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{LengthUnit::metre}});
   return scene;
 }
@@ -81,13 +82,14 @@ std::map<std::string, std::string> members_of(const ShowState& show_state) {
   for (const Output& each : screens)
     all["screens"] += each.name + " " + screen_names()[static_cast<std::size_t>(each.shows)] + "; ";
   for (std::size_t i = 0; i < slots.size(); ++i) {
-    const auto& [variant, nudge, pin, marker, material] = slots[i];
+    const auto& [variant, nudge, pin, marker, material, window] = slots[i];
     const std::string slot = fmt::format("slots[{}].", i);
     all[slot + "variant"] = variant;
     all[slot + "nudge"] = text_of(Pose(Eigen::Quaterniond::Identity(), nudge));
     all[slot + "pin"] = pin ? text_of(pin->prototype_from_part) : "";
     all[slot + "marker"] = marker ? marker->text() : "";
     all[slot + "material"] = look_json({"material", {{"", "", Pose{}, material}}});
+    all[slot + "window"] = window ? fmt::format("{} {}", window->width, window->level) : "";
   }
   return all;
 }
@@ -161,6 +163,10 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
     case ActionId::material:
       return Case{usual, "#ffffff 0 0.4", {"slots[0].material"}, [](const ShowState& s) {
                     return s.slots[0].material == MaterialOverride{Eigen::Vector3d(1, 1, 1), 0, 0.4};
+                  }};
+    case ActionId::window:
+      return Case{usual, "400 40", {"slots[0].window"}, [](const ShowState& s) {
+                    return s.slots[0].window == GreyWindow{40, 400};
                   }};
     case ActionId::finish:
       return Case{usual, "sand", {"finish"}, [](const ShowState& s) { return s.finish == "sand"; }};
