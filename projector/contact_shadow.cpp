@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "projector/bindings.h"
+#include "projector/cap_counter.h"
 #include "scene/meshes/mesh_bvh.h"
 
 namespace limn::projector {
@@ -44,6 +45,7 @@ DistanceField distance_field(const scene::Mesh& mesh, double farthest_m) {
 
 ContactShadow::ContactShadow(const scene::Scene& scene) {
   constexpr int k_nodes = DistanceField::k_nodes;
+  section_ = scene.section;
   std::vector<DistanceField> all;
   for (const scene::Slot& slot : scene.slots) {
     SlotFields& fields = slots_.emplace_back(SlotFields{slot.name, {}});
@@ -81,7 +83,11 @@ void ContactShadow::place(const scene::PosedScene& posed) {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
       if (slots_[i].name != part.slot) continue;
       const auto field = slots_[i].variants.find(part.variant);
-      if (field != slots_[i].variants.end()) shown_fields_[i + 1] = field->second;
+      if (field == slots_[i].variants.end()) continue;
+      shown_fields_[i + 1] = field->second;
+      if (posed.cut && section_ && section_->cuts(part.slot))
+        shown_fields_[i + 1].cut =
+            coefficients(scene::transformed(part.world_from_part.inverse(), *posed.cut));
     }
   glNamedBufferSubData(*fields_, 0, static_cast<GLsizeiptr>(shown_fields_.size() * sizeof(GpuField)),
                        shown_fields_.data());

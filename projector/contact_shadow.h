@@ -48,12 +48,14 @@ class ContactShadow final : public Bindable {
     Eigen::Vector4f lower = Eigen::Vector4f::Zero();  // w: 1 when the part is shown
     Eigen::Vector4f nodes_per_m = Eigen::Vector4f::Zero();
     Eigen::Vector4f first = Eigen::Vector4f::Zero();  // its first node in the texture
+    Eigen::Vector4f cut = {0, 0, 0, -1};  // the plane that cuts it, as coefficients() in its frame
   };
   struct SlotFields {
     std::string name;
     std::map<std::string, GpuField> variants;
   };
   std::vector<SlotFields> slots_;
+  std::optional<scene::Section> section_;
   std::vector<GpuField> shown_fields_;  // indexed by owner
   GlName distances_, fields_;
 };

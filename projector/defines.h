@@ -17,14 +17,17 @@ enum class Define {
   second_uvs,      ///< Textures lie in second texture coordinates.
   vertex_colours,  ///< Meshes have colours at their corners.
   room_image,      ///< A picture of the room lights parts.
+  section,         ///< A plane may cut what is seen.
+  count_cap,       ///< The program counts surfaces for caps.
   surface_parts,   ///< Surface parts (lying on the prototype) may be visible.
   view_parts       ///< View parts (drawn for the viewer's position) may be visible.
 };
 
 /// Each Define as shaders spell it, in the order of the enumeration.
 inline constexpr std::array k_define_names = {
-    "BY_MEASUREMENT", "CONTACT_SHADOW", "CACHED_SHARES",  "WORK_LIST",  "SURFACE_MAPS",  "FINISH",
-    "CLEARCOAT",      "SECOND_UVS",     "VERTEX_COLOURS", "ROOM_IMAGE", "SURFACE_PARTS", "VIEW_PARTS"};
+    "BY_MEASUREMENT", "CONTACT_SHADOW", "CACHED_SHARES", "WORK_LIST",      "SURFACE_MAPS",
+    "FINISH",         "CLEARCOAT",      "SECOND_UVS",    "VERTEX_COLOURS", "ROOM_IMAGE",
+    "SECTION",        "COUNT_CAP",      "SURFACE_PARTS", "VIEW_PARTS"};
 
 /// The names that a shader is compiled with.
 class Defines {

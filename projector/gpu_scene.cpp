@@ -13,6 +13,8 @@
 #include "core/result.h"
 #include "projector/bindings.h"
 #include "projector/brdf_lut.h"
+#include "projector/cap_counter.h"
+#include "scene/meshes/closed_pieces.h"
 
 namespace limn::projector {
 namespace {
@@ -300,7 +302,7 @@ Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
-GpuScene::GpuScene(const scene::Scene& scene) {
+GpuScene::GpuScene(const scene::Scene& scene) : section_(scene.section) {
   Staging staging;
   const std::size_t count = triangles_of(scene);
   // The neighbours come first, so that their temporary memory is freed before the corners and normals need
@@ -461,6 +463,9 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
   add_tangents(mesh, first_material, staging);
   add_second_uvs(mesh, first_material, staging);
   add_colours(mesh, first_material, staging);
+  constexpr std::uint32_t k_sheet = 1U << 31;  // as in shaders/scene.glsl
+  std::vector<bool> are_closed(mesh.triangles.size(), true);
+  if (section_) are_closed = scene::are_of_closed_pieces(mesh);
   Eigen::AlignedBox3d bounds;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % k_cluster == 0) run.clusters.push_back({run.first + static_cast<int>(t), 0, {}});
@@ -474,6 +479,7 @@ TriangleRun GpuScene::add(const scene::Mesh& mesh, int owner, Staging* staging) 
     GpuTriangle& triangle = staging->triangles[static_cast<std::size_t>(run.first) + t];
     triangle.owner = static_cast<std::uint32_t>(owner);
     triangle.material = first_material + mesh.triangle_materials[t];
+    if (!are_closed[t]) triangle.material |= k_sheet;
   }
   for (const TriangleRun::Cluster& cluster : run.clusters) bounds.extend(cluster.box);
   if (run.count > 0) {
@@ -489,12 +495,15 @@ Pose GpuScene::scene_from_world(const scene::PosedScene& posed) {
 
 void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const {
   const Pose from_world = scene_from_world(posed);
+  std::optional<scene::CutPlane> cut;
+  if (section_ && posed.cut) cut = scene::transformed(from_world, *posed.cut);
   runs->clear();
   if (prototype_ && posed.world_from_prototype) {
     runs->push_back({0, &*prototype_, Pose()});
     const auto finish = std::find_if(finishes_.begin(), finishes_.end(),
                                      [&](const GpuFinish& known) { return known.name == posed.finish; });
     if (finish != finishes_.end()) runs->back().finish = static_cast<int>(finish - finishes_.begin());
+    if (cut && section_->cuts_prototype) runs->back().cut = cut;
   }
   for (const scene::PosedPart& part : posed.parts) {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
@@ -503,12 +512,26 @@ void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* ru
       LIMN_CHECK(variant != slots_[i].variants.end());
       runs->push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
                        slots_[i].on_surface, -1, part.material});
+      if (cut && section_->cuts(part.slot)) runs->back().cut = cut;
     }
   }
 }
 
+// What counts the lines on the part's cap, from a point of the scene.
+Eigen::Vector4f GpuScene::hatch_of(const PlacedRun& placed) const {
+  if (!placed.cut) return Eigen::Vector4f::Zero();
+  const Pose owner_from_scene = placed.scene_from_owner.inverse();
+  const Eigen::Vector3d across =
+      scene::across_hatch(owner_from_scene.rotation * placed.cut->normal, placed.owner) / section_->hatch_m;
+  Eigen::Vector4f out;
+  out << (placed.scene_from_owner.rotation * across).cast<float>(),
+      static_cast<float>(across.dot(owner_from_scene.translation));
+  return out;
+}
+
 void GpuScene::place(const std::vector<PlacedRun>& runs) {
   std::fill(gpu_owners_.begin(), gpu_owners_.end(), GpuOwner());
+  cut_.reset();
   for (const PlacedRun& placed : runs) {
     GpuOwner& owner = gpu_owners_[static_cast<std::size_t>(placed.owner)];
     owner.owner_from_scene = placed.scene_from_owner.inverse().matrix().cast<float>();
@@ -517,6 +540,8 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
     if (placed.material.base_colour) owner.colour = placed.material.base_colour->cast<float>().homogeneous();
     owner.metallic_roughness.x() = static_cast<float>(placed.material.metallic.value_or(-1));
     owner.metallic_roughness.y() = static_cast<float>(placed.material.roughness.value_or(-1));
+    owner.hatch = hatch_of(placed);
+    if (placed.cut) cut_ = placed.cut;
     if (placed.finish < 0) continue;
     const GpuFinish& finish = finishes_[static_cast<std::size_t>(placed.finish)];
     owner.metallic_roughness.z() = static_cast<float>(finish.material + 1);
@@ -536,6 +561,13 @@ void GpuScene::bind(const Use& use) const {
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_materials_buffer, *materials_);
   use.program.set("u_has_cut_outs", has_cut_outs_);
   use.program.set("u_placement_count", owner_count());
+  if (!section_) return;
+  use.program.set("u_cut", coefficients(cut_));
+  use.program.set("u_prototype_hatch",
+                  is_prototype_cut_ ? gpu_owners_[0].hatch : Eigen::Vector4f(Eigen::Vector4f::Zero()));
+  use.program.set("u_cap_colour", Eigen::Vector3f(section_->cap_colour.cast<float>()));
+  use.program.set("u_hatch", Eigen::Vector2f(static_cast<float>(scene::k_hatch_line),
+                                             static_cast<float>(scene::k_hatch_colour)));
 }
 
 std::array<Eigen::Vector3d, 8> bounds_of(const PlacedRun& placed, double margin_m) {

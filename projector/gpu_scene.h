@@ -41,6 +41,8 @@ struct PlacedRun {
   bool on_surface = false;  ///< Whether its slot's mode is `surface`.
   int finish = -1;          ///< Index in the scene of the prototype's finish; -1: none.
   scene::MaterialOverride material = {};
+  /// The plane that cuts it, in the scene's frame. The prototype is cut in views only.
+  std::optional<scene::CutPlane> cut = {};
 };
 
 /// All meshes of a scene on the GPU, in the layout that shaders/scene.glsl reads.
@@ -60,6 +62,9 @@ class GpuScene final : public Bindable {
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Uploads the poses.
   void place(const std::vector<PlacedRun>& runs);
+  /// Whether the prototype is cut, too, in what is drawn from now on. Off by default.
+  void cut_prototype(bool wanted) { is_prototype_cut_ = wanted; }
+  bool is_prototype_cut() const { return is_prototype_cut_; }
   /// Binds Resource::scene.
   void bind(const Use& use) const override;
 
@@ -70,8 +75,10 @@ class GpuScene final : public Bindable {
            (has_clearcoat_ ? Defines{Define::clearcoat} : Defines{}) +
            (has_second_uvs_ ? Defines{Define::second_uvs} : Defines{}) +
            (has_vertex_colours_ ? Defines{Define::vertex_colours} : Defines{}) +
-           (has_room_image_ ? Defines{Define::room_image} : Defines{});
+           (has_room_image_ ? Defines{Define::room_image} : Defines{}) + section_defines();
   }
+  /// Define::section in a scene with a section.
+  Defines section_defines() const { return section_ ? Defines{Define::section} : Defines{}; }
   /// The same for a prototype with a finish.
   Defines finish_defines() const {
     return shading_defines() + Defines{Define::finish} +
@@ -94,7 +101,9 @@ class GpuScene final : public Bindable {
     Eigen::Vector4f colour = Eigen::Vector4f::Zero();
     // The prototype's has also z: its finish's material + 1, or 0; w: 1 when the finish is for the viewer.
     Eigen::Vector4f metallic_roughness = {-1, -1, 0, 0};
+    Eigen::Vector4f hatch = Eigen::Vector4f::Zero();  // 0: not cut
   };
+  Eigen::Vector4f hatch_of(const PlacedRun& placed) const;
   TriangleRun add(const scene::Mesh& mesh, int owner, Staging* staging);
   void add_finish(const scene::Finish& finish, Staging* staging);
   void add_material(const scene::Material& material, const scene::Mesh& mesh, Staging* staging);
@@ -112,6 +121,9 @@ class GpuScene final : public Bindable {
   std::vector<GpuFinish> finishes_;
   bool has_cut_outs_ = false, has_surface_maps_ = false, has_clearcoat_ = false, has_second_uvs_ = false,
        has_coated_finish_ = false, has_vertex_colours_ = false, has_room_image_ = false;
+  std::optional<scene::Section> section_;
+  std::optional<scene::CutPlane> cut_;  // cuts the runs that were placed last
+  bool is_prototype_cut_ = false;
   std::vector<GpuOwner> gpu_owners_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
   GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers

@@ -63,8 +63,9 @@ Result<ImagerView> ImagerView::create(const Shared& shared, const scene::Scene& 
   LIMN_TRY(view.parts_passes_, PartsPasses::link(gpu.shading_defines(), gpu.finish_defines()));
   LIMN_TRY(view.composite_pass_,
            FullscreenPass::link({.shader = "composite.frag", .reads = {light, camera_image}}));
-  LIMN_TRY(view.coverage_pass_,
-           FullscreenPass::link({.shader = "coverage.frag", .reads = {scene, viewpoints, lens}}));
+  LIMN_TRY(view.coverage_pass_, FullscreenPass::link({.shader = "coverage.frag",
+                                                      .defines = gpu.section_defines(),
+                                                      .reads = {scene, viewpoints, lens}}));
   LIMN_TRY(view.illuminated_patches_pass_,
            FullscreenPass::link({.shader = "illuminated_patches.frag",
                                  .reads = {scene, viewpoints, occlusion, lens, projector}}));
@@ -142,7 +143,7 @@ void ImagerView::draw_parts(const Imager& imager,
   const std::vector<cv::Rect> places = without_overlaps(places_of(changed));
   clear_light(overlay->parts.texture, size, places, 0);
   if (!sees_prototype) std::erase_if(changed, [](const PlacedRun& run) { return run.owner == 0; });
-  scene.draw_from_imager_over(imager, changed, around_m);
+  scene.draw_from_imager_over(imager, changed, around_m, is_view);
   Resources resources = scene.resources(lens, imager)
                             .with(Resource::albedo, shared_.balance.albedo())
                             .with(Resource::composite_weights, weights);

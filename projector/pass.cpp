@@ -49,7 +49,7 @@ void ComputePass::run_over_list(const PixelList& pixels, const Resources& resour
 }
 
 Result<FullscreenPass> FullscreenPass::link(const Description& description) {
-  LIMN_TRY(Program program, Program::link("fullscreen.vert", description.shader));
+  LIMN_TRY(Program program, Program::link("fullscreen.vert", description.shader, description.defines));
   return FullscreenPass(std::move(program), description);
 }
 

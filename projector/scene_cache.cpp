@@ -5,7 +5,7 @@
 namespace limn::projector {
 bool is_same(const PlacedRun& a, const PlacedRun& b) {
   return a.owner == b.owner && a.run == b.run && is_same(a.scene_from_owner, b.scene_from_owner) &&
-         a.material == b.material && a.finish == b.finish;
+         a.material == b.material && a.finish == b.finish && a.cut == b.cut;
 }
 
 bool is_same_lens(const Imager& a, const Imager& b) {
@@ -15,7 +15,7 @@ bool is_same_lens(const Imager& a, const Imager& b) {
 
 Result<SceneCache> SceneCache::create(const scene::Scene& scene, const Rig& rig, PassTimes* times) {
   LIMN_TRY_STATUS(GpuScene::check_fits(scene, GpuScene::most_triangles()));
-  LIMN_TRY(VisibilityBuffers visibility, VisibilityBuffers::create(rig));
+  LIMN_TRY(VisibilityBuffers visibility, VisibilityBuffers::create(rig, scene.section.has_value()));
   return SceneCache(scene, rig, std::move(visibility), times);
 }
 
@@ -42,6 +42,7 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
     viewpoint_kind_ = ViewpointKind::none;
     prepared_ = posed;
   }
+  scene_.cut_prototype(false);
   const bool all = needed == FromProjectors::all;
   if (needed == FromProjectors::nothing || (is_prototype_drawn_ && !all) ||
       (are_soft_edges_drawn_ && are_surface_parts_drawn_))
@@ -88,10 +89,12 @@ void SceneCache::draw_from_imager(const Imager& imager) {
 
 void SceneCache::draw_from_imager_over(const Imager& imager,
                                        const std::vector<PlacedRun>& over,
-                                       double around_m) {
+                                       double around_m,
+                                       bool cuts_prototype) {
   const auto is_equal = [](const PlacedRun& a, const PlacedRun& b) { return is_same(a, b); };
+  scene_.cut_prototype(cuts_prototype);
   if (is_drawn_from(ViewpointKind::places_of_imager, imager) && viewpoint_around_m_ == around_m &&
-      std::ranges::equal(viewpoint_over_, over, is_equal))
+      viewpoint_cuts_prototype_ == cuts_prototype && std::ranges::equal(viewpoint_over_, over, is_equal))
     return;
   const PassTimes::Scope scope(times_, "ids from a camera");
   visibility_.draw_from_imager_over(scene_, runs_, scene_from_world_, imager, lens_of(imager).baked, over,
@@ -100,6 +103,7 @@ void SceneCache::draw_from_imager_over(const Imager& imager,
   viewpoint_imager_ = imager;
   viewpoint_over_ = over;
   viewpoint_around_m_ = around_m;
+  viewpoint_cuts_prototype_ = cuts_prototype;
 }
 
 void SceneCache::draw_from_reference_camera(const Imager& camera) {

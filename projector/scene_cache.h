@@ -36,8 +36,12 @@ class SceneCache {
   /// Draws the ids that a viewer or an imager sees of the prepared scene.
   void draw_from_viewer(const Imager& viewer);
   void draw_from_imager(const Imager& imager);
-  /// The same only where the imager sees something within `around_m` of the meshes `over`.
-  void draw_from_imager_over(const Imager& imager, const std::vector<PlacedRun>& over, double around_m);
+  /// The same only where the imager sees something within `around_m` of the meshes `over`. `cuts_prototype`:
+  /// a plane that cuts the prototype is used, until the next prepare().
+  void draw_from_imager_over(const Imager& imager,
+                             const std::vector<PlacedRun>& over,
+                             double around_m,
+                             bool cuts_prototype);
   /// Draws the ids that the reference camera sees of the prepared scene, and keeps them.
   void draw_from_reference_camera(const Imager& camera);
 
@@ -80,6 +84,7 @@ class SceneCache {
   Imager viewpoint_imager_;
   std::vector<PlacedRun> viewpoint_over_;  // with places_of_imager: the arguments of draw_from_imager_over
   double viewpoint_around_m_ = 0;
+  bool viewpoint_cuts_prototype_ = false;
   std::vector<std::pair<Imager, GpuLens>> lenses_;  // lenses of cameras and viewers, the newest last
 };
 

@@ -85,10 +85,12 @@ void for_each_uniform(GLuint program, const Use& use) {
 
 }  // namespace
 
-Result<Program> Program::link(const std::string& vertex_file, const std::string& fragment_file) {
+Result<Program> Program::link(const std::string& vertex_file,
+                              const std::string& fragment_file,
+                              Defines defines) {
   std::array<GlName, 2> shaders;
-  LIMN_TRY(shaders[0], compile(GL_VERTEX_SHADER, vertex_file));
-  LIMN_TRY(shaders[1], compile(GL_FRAGMENT_SHADER, fragment_file));
+  LIMN_TRY(shaders[0], compile(GL_VERTEX_SHADER, vertex_file, defines));
+  LIMN_TRY(shaders[1], compile(GL_FRAGMENT_SHADER, fragment_file, defines));
   return link(shaders, vertex_file + " and " + fragment_file);
 }
 

@@ -22,10 +22,12 @@ const std::map<std::string, std::string>& embedded_shaders();
 /// when it is linked.
 class Program {
  public:
-  /// Links files of shaders/. The first `#include "x.glsl"` of a file is replaced by its text, further ones
-  /// by nothing. `#line` directives make the driver's messages name the true line. Error: the driver's
-  /// message with file names.
-  static Result<Program> link(const std::string& vertex_file, const std::string& fragment_file);
+  /// Links files of shaders/, compiled with `defines`. The first `#include "x.glsl"` of a file is replaced by
+  /// its text, further ones by nothing. `#line` directives make the driver's messages name the true line.
+  /// Error: the driver's message with file names.
+  static Result<Program> link(const std::string& vertex_file,
+                              const std::string& fragment_file,
+                              Defines defines = {});
 
   /// The same for a compute shader, compiled with `defines`.
   static Result<Program> link_compute(const std::string& file, Defines defines = {});
@@ -44,6 +46,12 @@ class Program {
   }
   void set(const char* uniform, const Eigen::Vector4f& v) const {
     glProgramUniform4fv(*name_, location_of(uniform), 1, v.data());
+  }
+  void set(const char* uniform, const Eigen::Vector3f& v) const {
+    glProgramUniform3fv(*name_, location_of(uniform), 1, v.data());
+  }
+  void set(const char* uniform, const Eigen::Vector2f& v) const {
+    glProgramUniform2fv(*name_, location_of(uniform), 1, v.data());
   }
   /// Sets the first entries of an array.
   void set_vectors(const char* uniform, std::span<const Eigen::Vector4f> vectors) const {

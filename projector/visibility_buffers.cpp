@@ -162,7 +162,7 @@ struct VisibilityBuffers::GpuViewpoint {
   }
 };
 
-Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
+Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig, bool has_section) {
   VisibilityBuffers visibility;
   const std::vector<Imager>& projectors = rig.projectors;
   LIMN_TRY(visibility.program_, Program::link("ids.vert", "ids.frag"));
@@ -197,6 +197,9 @@ Result<VisibilityBuffers> VisibilityBuffers::create(const Rig& rig) {
              EdgeFeathering::create(static_cast<int>(projectors.size()), visibility.ids_width_,
                                     visibility.ids_height_));
   }
+  if (has_section) {
+    LIMN_TRY(visibility.cap_counter_, CapCounter::create(k_viewer_ids_side, k_viewer_ids_side));
+  }
   visibility.framebuffer_ = make_framebuffer();
   glNamedFramebufferTexture(*visibility.framebuffer_, GL_DEPTH_ATTACHMENT, *visibility.depth_, 0);
   const std::vector<std::byte> empty((projectors.size() + 2) * sizeof(GpuViewpoint));
@@ -212,6 +215,7 @@ void VisibilityBuffers::draw(const GpuScene& scene,
                              const cv::Rect& within,
                              const GlName& ids,
                              int layer) {
+  const bool has_caps = *ids == *viewer_ids_;  // what lies on the surface shows none
   glNamedFramebufferTextureLayer(*framebuffer_, GL_COLOR_ATTACHMENT0, *ids, 0, layer);
   glBindFramebuffer(GL_FRAMEBUFFER, *framebuffer_);
   glViewport(0, 0, pinhole.width, pinhole.height);
@@ -228,39 +232,51 @@ void VisibilityBuffers::draw(const GpuScene& scene,
   glDepthFunc(GL_GREATER);
   glCullFace(GL_FRONT);  // rows run downwards, so that GL takes back faces for front faces
   glDisable(GL_BLEND);
-  glBindVertexArray(scene.vertex_array());
-  const TangentRect rect = covered(pinhole);
-  const auto draw_triangles = [](int first, int count) {
-    if (count > 0) glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
-  };
   for (const PlacedRun& placed : runs) {
     if (!wanted(placed)) continue;
+    const bool is_cut = placed.cut && (placed.owner != 0 || scene.is_prototype_cut());
     const Pose pinhole_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
-    (hides_back_faces(placed, pinhole_from_owner) ? glEnable : glDisable)(GL_CULL_FACE);
+    (!is_cut && hides_back_faces(placed, pinhole_from_owner) ? glEnable : glDisable)(GL_CULL_FACE);
     const Eigen::Matrix4d clip_from_owner = clip_from_pinhole(pinhole) * pinhole_from_owner.matrix();
-    const Program& program = placed.run->has_cut_outs ? cut_program_ : program_;
+    const Program& program = is_cut                     ? cap_counter_->ids_program(placed, pinhole)
+                             : placed.run->has_cut_outs ? cut_program_
+                                                        : program_;
     scene.bind({Resource::scene, GL_READ_ONLY, program});
     program.use();
     program.set("u_has_cut_outs", placed.run->has_cut_outs);
     program.set("u_focal", static_cast<float>(pinhole.focal));
     program.set("u_clip_from_owner", Eigen::Matrix4f(clip_from_owner.cast<float>()));
-    // Consecutive visible clusters are drawn in one call.
-    int first = placed.run->first, count = 0;
-    for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
-      if (intersected(rect, tangents_spanned(pinhole_from_owner, corners_of(cluster.box))).is_empty())
-        continue;
-      if (cluster.first != first + count) {
-        draw_triangles(first, count);
-        first = cluster.first;
-        count = 0;
-      }
-      count += cluster.count;
-    }
-    draw_triangles(first, count);
+    glBindVertexArray(scene.vertex_array());
+    const auto draw_all = [&] { draw_triangles(placed, pinhole); };
+    draw_all();
+    const cv::Rect texels =
+        within & texels_of(pinhole, tangents_spanned(pinhole.pinhole_from_scene, bounds_of(placed)));
+    if (is_cut && has_caps && !texels.empty())
+      cap_counter_->draw_cap(scene, placed, pinhole, texels, framebuffer_, draw_all);
   }
   glDisable(GL_DEPTH_TEST);
   glDisable(GL_CULL_FACE);
   glFlush();  // softpipe makes drawn ids visible to compute programs only after a flush
+}
+
+// Draws the triangles of a mesh that may be visible; consecutive clusters in one call.
+void VisibilityBuffers::draw_triangles(const PlacedRun& placed, const PinholeView& pinhole) const {
+  const TangentRect rect = covered(pinhole);
+  const Pose pinhole_from_owner = pinhole.pinhole_from_scene * placed.scene_from_owner;
+  const auto draw_some = [](int first, int count) {
+    if (count > 0) glDrawArrays(GL_TRIANGLES, 3 * first, 3 * count);
+  };
+  int first = placed.run->first, count = 0;
+  for (const TriangleRun::Cluster& cluster : placed.run->clusters) {
+    if (intersected(rect, tangents_spanned(pinhole_from_owner, corners_of(cluster.box))).is_empty()) continue;
+    if (cluster.first != first + count) {
+      draw_some(first, count);
+      first = cluster.first;
+      count = 0;
+    }
+    count += cluster.count;
+  }
+  draw_some(first, count);
 }
 
 void VisibilityBuffers::send(int index, const GpuViewpoint& viewpoint) {

@@ -6,6 +6,7 @@
 
 #include "core/rig.h"
 #include "projector/bake.h"
+#include "projector/cap_counter.h"
 #include "projector/edge_feathering.h"
 #include "projector/gpu_scene.h"
 #include "projector/pinhole_view.h"
@@ -30,7 +31,8 @@ struct GpuLens final : public Bindable {
 /// its pose in the scene's frame.
 class VisibilityBuffers final : public Bindable {
  public:
-  static Result<VisibilityBuffers> create(const Rig& rig);
+  /// `has_section`: planes may cut what is drawn; what they need is made ready.
+  static Result<VisibilityBuffers> create(const Rig& rig, bool has_section);
 
   /// Draws the projectors' ids of the prototype. `with_soft_edges`: also computes the edge feathering, which
   /// only the projectors' own images need.
@@ -111,6 +113,7 @@ class VisibilityBuffers final : public Bindable {
             const cv::Rect& within,
             const GlName& ids,
             int layer);
+  void draw_triangles(const PlacedRun& placed, const PinholeView& pinhole) const;
   PinholeView projector_pinhole_view(std::size_t projector,
                                      const std::vector<PlacedRun>& runs,
                                      const Pose& scene_from_world) const;
@@ -128,6 +131,7 @@ class VisibilityBuffers final : public Bindable {
   std::vector<GpuLens> lenses_;
   Program program_, cut_program_;  // for whole triangles, and for triangles with an alpha cutoff
   std::optional<EdgeFeathering> edge_feathering_;  // only with several projectors
+  std::optional<CapCounter> cap_counter_;          // only with a section
   GlName framebuffer_, depth_, projector_ids_, viewer_ids_, pixel_maps_, viewpoints_, viewpoint_texels_;
   int ids_width_ = 1, ids_height_ = 1;    // size of the texture of the projectors' ids
   std::vector<cv::Rect> surface_places_;  // texels of each projector's ids that may contain surface parts

@@ -26,6 +26,7 @@ const int k_brdf_lut_unit = 19;      // how materials reflect soft light
 const int k_depth_unit = 20;         // depth buffer of a projector's ids
 const int k_depth_edges_unit = 21;   // as k_depth_edges_image
 const int k_room_image_unit = 22;    // a picture of the room as surfaces reflect it
+const int k_cap_count_unit = 23;     // how often each texel's ray enters and leaves a part behind a cut
 
 // Image units; GL 4.5 guarantees eight.
 const int k_target_image = 0;         // the image that a pass draws

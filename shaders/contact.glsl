@@ -13,6 +13,7 @@ struct Field {
   vec4 lower;  // lower bound of the nodes, owner frame; w: 1 when the part is shown
   vec4 nodes_per_m;
   vec4 first;  // first node in the texture
+  vec4 cut;    // height of q (owner frame) over the plane that cuts the part: dot(xyz, q) + w
 };
 layout(std430, binding = k_distance_fields_buffer) readonly buffer Fields { Field s_fields[]; };  // indexed by owner
 layout(binding = k_distances_unit) uniform sampler3D s_distances;
@@ -24,7 +25,8 @@ const int k_field_nodes = 48;
 
 float distance_to_part(Field field, vec3 q) {
   vec3 node = clamp((q - field.lower.xyz) * field.nodes_per_m.xyz, 0.0, float(k_field_nodes - 1));
-  return texture(s_distances, (field.first.xyz + node + 0.5) / vec3(textureSize(s_distances, 0))).x;
+  float whole = texture(s_distances, (field.first.xyz + node + 0.5) / vec3(textureSize(s_distances, 0))).x;
+  return max(whole, dot(field.cut.xyz, q) + field.cut.w);  // what is kept is at least this far away
 }
 
 // Share of the light that one part keeps from the point q with unit normal n, both in the part's frame.

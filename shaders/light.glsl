@@ -25,6 +25,7 @@ vec4 view_colour(vec3 p, vec3 d_normal, float footprint) {
   Hit hit = first_hit(s_viewer_ids, viewer, 1, d);
   if (hit.id == 0u || hit.t > t || owner_at(owner_of(hit.id)).upper.w > 0.5) return vec4(0);
   if (is_hidden(s_viewer_ids, viewer, p)) return vec4(0);
+  if (is_cap(hit.id)) return vec4(cap_light(hit, viewer.p_origin.xyz, d, footprint), 1);
   return vec4(radiance_along(d, hit, footprint), 1);
 }
 

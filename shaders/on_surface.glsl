@@ -80,6 +80,7 @@ Hit surface_part_at(usampler2DArray s_ids, Viewpoint viewpoint, vec3 p, vec3 d_n
       left = uvec4(left.yzw, 0u);
       Hit hit;
       if (owner_at(owner_of(id)).upper.w < 0.5 || !plane_hit(id, p, d_normal, hit) || abs(hit.t) > k_on_surface) continue;
+      if (is_removed(id, p + hit.t * d_normal)) continue;
       float outside = -min(hit.weights.x, min(hit.weights.y, hit.weights.z));
       if (outside > hit.slack) {
         if (outside < missed_by) {

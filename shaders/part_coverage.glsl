@@ -36,7 +36,7 @@ VisiblePart visible_part_at(vec2 px) {
   // Height of the part above the surface.
   float height = (prototype.t - visible.part.t) * -dot(behind.d_flat, d);
   if (height < (on_surface ? -k_on_surface : -k_same_place)) return visible;
-  bool may_be_projected = !on_surface || height <= k_on_surface;
+  bool may_be_projected = !on_surface || (height <= k_on_surface && !is_cap(visible.part.id));
   visible.shown_by = may_be_projected ? k_if_reached : k_screen;
   visible.behind = behind;
   return visible;

@@ -49,6 +49,8 @@ vec4 composite_light(VisiblePart visible, bool is_full) {
   if (share < 1.0 && !is_reached(visible.behind)) share = 1.0;
   if (share == 0.0) return vec4(0);
   float footprint = visible.part.t / viewpoint_at(u_viewer).quality.x;
+  if (is_cap(visible.part.id))
+    return share * vec4(cap_light(visible.part, viewpoint_at(u_viewer).p_origin.xyz, visible.d, footprint), 1);
   if (owner_at(owner_of(visible.part.id)).upper.w > 0.5) {  // shaded as the projectors show it
     return share * vec4(radiance_on_surface(visible.part, smooth_normal(visible.part), footprint), 1);
   }

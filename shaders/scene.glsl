@@ -3,18 +3,26 @@
 // that is read often is in texel buffers: software GL reads them several times faster than storage buffers,
 // because it loads the lanes of storage buffers one by one.
 #include "bindings.glsl"
+#include "cut.glsl"
 
 // 3 for each triangle: p in its owner's frame, u.
 layout(binding = k_corners_unit) uniform samplerBuffer s_corners;
 layout(binding = k_normals_unit) uniform samplerBuffer s_normals;  // 3 for each triangle: unit normal, v
-// 5 for each triangle: owner (0 prototype, slot + 1), material, and for each corner the id of the triangle
-// across the opposite side (0 where the mesh ends)
+// 5 for each triangle: owner (0 prototype, slot + 1), material (bit 31: it is of a sheet, a piece that does not close),
+// and for each corner the id of the triangle across the opposite side (0 where the mesh ends)
 layout(binding = k_triangles_unit) uniform usamplerBuffer s_triangles;
 
 vec4 corner(uint i) { return texelFetch(s_corners, int(i)); }
 vec4 normal(uint i) { return texelFetch(s_normals, int(i)); }
-uint owner_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u))).x; }
-uint material_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u) + 1u)).x; }
+uint owner_of(uint id) {
+#ifdef SECTION
+  if (is_cap(id)) return id - k_first_cap;
+#endif
+  return texelFetch(s_triangles, int(5u * (id - 1u))).x;
+}
+const uint k_sheet = 0x80000000u;
+uint material_of(uint id) { return texelFetch(s_triangles, int(5u * (id - 1u) + 1u)).x & ~k_sheet; }
+bool is_of_sheet(uint id) { return (texelFetch(s_triangles, int(5u * (id - 1u) + 1u)).x & k_sheet) != 0u; }
 uint neighbour(uint id, int side) { return texelFetch(s_triangles, int(5u * (id - 1u) + 2u) + side).x; }
 
 struct Material {
@@ -46,8 +54,9 @@ struct Owner {
   vec4 colour; // override of the materials' colour, linear light, where w is 1
   vec4 metallic_roughness;  // overrides, where not negative; of the prototype z: its finish's material + 1,
                             // or 0; w: 1 when the finish is for the viewer
+  vec4 hatch;  // of a part that is cut: its product with (p, 1), scene frame, counts the lines on its cap; else 0
 };
-layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 8 for each owner
+layout(binding = k_placements_unit) uniform samplerBuffer s_placements;  // 9 for each owner
 
 mat4 matrix_at(samplerBuffer texels, int first) {
   return mat4(texelFetch(texels, first), texelFetch(texels, first + 1), texelFetch(texels, first + 2),
@@ -55,9 +64,10 @@ mat4 matrix_at(samplerBuffer texels, int first) {
 }
 
 Owner owner_at(uint owner) {
-  int first = 8 * int(owner);
+  int first = 9 * int(owner);
   return Owner(matrix_at(s_placements, first), texelFetch(s_placements, first + 4), texelFetch(s_placements, first + 5),
-               texelFetch(s_placements, first + 6), texelFetch(s_placements, first + 7));
+               texelFetch(s_placements, first + 6), texelFetch(s_placements, first + 7),
+               texelFetch(s_placements, first + 8));
 }
 
 // A viewpoint: where rays start, with the ids that a pinhole image from there holds: layer 0 the prototype,
@@ -98,6 +108,23 @@ const float k_same_place = 1e-4;   // m; hits closer than this are one surface
 vec3 to_owner(uint owner, vec3 p) { return (owner_at(owner).owner_from_scene * vec4(p, 1)).xyz; }
 vec3 turned_to_owner(uint owner, vec3 d) { return mat3(owner_at(owner).owner_from_scene) * d; }
 vec3 turned_to_scene(uint owner, vec3 d) { return d * mat3(owner_at(owner).owner_from_scene); }
+
+#ifdef SECTION
+vec4 hatch_of(uint owner) {
+  return owner == 0u ? u_prototype_hatch : texelFetch(s_placements, 9 * int(owner) + 8);
+}
+// Whether the plane removes the point p (scene frame) of the triangle.
+bool is_removed(uint id, vec3 p) {
+  return height_over_cut(p) > -k_cut_margin && hatch_of(owner_of(id)).xyz != vec3(0);
+}
+// Where a ray meets the plane, as a hit of this cap.
+Hit cap_hit(uint id, vec3 p_origin, vec3 d) {
+  Hit hit = Hit(id, -height_over_cut(p_origin) / dot(u_cut.xyz, d), vec3(0), 0.0);
+  return hit.t > 0.0 ? hit : k_no_hit;
+}
+#else
+bool is_removed(uint id, vec3 p) { return false; }
+#endif
 
 // Intersects the ray from o along w (unit length, both in the frame of the triangle's owner) with the plane
 // of a triangle. False when the ray is parallel to it.
@@ -231,14 +258,23 @@ Hit moved_onto_triangle(Hit hit, vec3 o, vec3 w, Viewpoint viewpoint) {
 
 // The first surface that a ray from the viewpoint hits. It is exact: the triangles in the four id texels
 // around the ray are intersected. Triangles thinner than a texel may all be missed; then the texels decide,
-// by bilinear coverage. Parts may have an alpha cutoff, the prototype has none. (Software GL executes
-// branches that no lane takes, and executes a loop once too often if its condition comes first. So rare work
+// by bilinear coverage. A cap's outline is decided in the same way. Parts may have an alpha cutoff, the prototype has
+// none. (Software GL executes branches that no lane takes, and executes a loop once too often if its condition comes first. So rare work
 // is a further round of a do-while loop.)
 Hit first_hit(usampler2DArray s_ids, Viewpoint viewpoint, int layer, vec3 d) {
   vec4 share;
   uvec4 ids = ids_around(s_ids, viewpoint, layer, d, share);
   Hit best = k_no_hit;
   if (ids == uvec4(0)) return best;
+#ifdef SECTION
+  // The cap of which the texels show most.
+  bvec4 are_caps = greaterThanEqual(ids, uvec4(k_first_cap));
+  uint cap = are_caps.x ? ids.x : are_caps.y ? ids.y : are_caps.z ? ids.z : are_caps.w ? ids.w : 0u;
+  float cap_share = dot(share, vec4(are_caps));
+  bool is_seen = dot(share, vec4(notEqual(ids, uvec4(0)))) >= 0.5;
+  ids = mix(ids, uvec4(0), are_caps);
+  if (ids == uvec4(0)) return cap_share >= 0.5 ? cap_hit(cap, viewpoint.p_origin.xyz, d) : k_no_hit;
+#endif
   uvec4 left = each_once(ids);
   uint nearest = left.x;
   bool is_covered = dot(share, vec4(notEqual(ids, uvec4(0)))) >= 0.5, is_whole = all(notEqual(ids, uvec4(0)));
@@ -257,11 +293,14 @@ Hit first_hit(usampler2DArray s_ids, Viewpoint viewpoint, int layer, vec3 d) {
     if (is_retry) {
       if (!is_met) break;
       hit = moved_onto_triangle(hit, o, w, viewpoint);
+      if (is_removed(hit.id, viewpoint.p_origin.xyz + hit.t * d)) break;
       if (hit.t > 0.0 && (is_whole || is_thin(hit.id, hit.t, w, viewpoint))) best = hit;
       break;
     }
     if (is_met && is_inside(hit) && hit.t > 0.0 && hit.t < best.t) {
-      if (layer == 1 && is_cut_out(hit, hit.t / viewpoint.focal_centre.x))
+      if (is_removed(hit.id, viewpoint.p_origin.xyz + hit.t * d))
+        is_through = true;
+      else if (layer == 1 && is_cut_out(hit, hit.t / viewpoint.focal_centre.x))
         is_through = true;
       else
         best = hit;
@@ -269,6 +308,12 @@ Hit first_hit(usampler2DArray s_ids, Viewpoint viewpoint, int layer, vec3 d) {
     is_retry = left.x == 0u && best.id == 0u && !is_through && is_covered;
     if (is_retry) left.x = nearest;
   } while (left.x != 0u);
+#ifdef SECTION
+  if (cap != 0u && (cap_share >= 0.5 || (best.id == 0u && is_seen))) {
+    Hit hit = cap_hit(cap, viewpoint.p_origin.xyz, d);
+    if (hit.t < best.t) best = hit;
+  }
+#endif
   return best;
 }
 

@@ -1,6 +1,7 @@
 // Shading of a part's surface, in linear light.
 #include "bindings.glsl"
 #include "material.glsl"
+#include "cap.glsl"
 
 // The room light, for materials that are not unlit: hemispherical soft light around an up direction, and
 // distant lamps. Directions are in the scene's frame; the light values are those reflected by a white surface

@@ -17,9 +17,12 @@ vec4 view_at(vec2 px) {
   // A part that lies on the surface is drawn in front of it.
   const float k_on_it = 0.002;
   if (part.id != 0u && (prototype.id == 0u || part.t < prototype.t + k_on_it)) {
+    if (is_cap(part.id)) return vec4(cap_light(part, viewer.p_origin.xyz, d, part.t / viewer.quality.x), 1);
     return vec4(radiance_along(d, part, part.t / viewer.quality.x), 1);
   }
   if (prototype.id == 0u) return vec4(0);
+  if (is_cap(prototype.id))
+    return vec4(cap_light(prototype, viewer.p_origin.xyz, d, prototype.t / viewer.quality.x), 1);
   vec3 n = facing_normal(prototype, d);
   float shadow = k_contact_shadow ? contact_shadow(viewer.p_origin.xyz + prototype.t * d, n) : 0.0;
   if (has_finish())

@@ -243,15 +243,35 @@ void add_rings(scene::Mesh& mesh,
   add_grid(mesh, first, k_around, rings, material, true);
 }
 
+// A disc whose rim, the vertices of a ring, runs counter-clockwise about the normal; clockwise: the other
+// way.
 void add_disc(scene::Mesh& mesh,
               const Vector3d& centre,
               const Vector3d& normal,
               const std::function<Vector3d(double)>& rim,
-              std::uint16_t material) {
+              std::uint16_t material,
+              bool is_clockwise = false) {
   const std::uint32_t middle = add_vertex(mesh, centre, normal);
   for (int i = 0; i < k_around; ++i) add_vertex(mesh, rim(2 * k_pi * i / k_around), normal);
-  for (std::uint32_t i = 0; i < k_around; ++i)
-    add_triangle(mesh, middle, middle + 1 + i, middle + 1 + (i + 1) % k_around, material);
+  for (std::uint32_t i = 0; i < k_around; ++i) {
+    const std::uint32_t here = middle + 1 + i, next = middle + 1 + (i + 1) % k_around;
+    add_triangle(mesh, middle, is_clockwise ? next : here, is_clockwise ? here : next, material);
+  }
+}
+
+// Rings that a disc closes at each end.
+void add_closed_rings(scene::Mesh& mesh,
+                      int rings,
+                      const std::function<Vector3d(double, double)>& p,
+                      std::uint16_t material) {
+  add_rings(mesh, rings, p, material);
+  for (const double k : {0.0, 1.0}) {
+    const Vector3d centre = 0.5 * (p(k, 0) + p(k, k_pi));
+    const Vector3d normal = (p(k, 0) - centre).cross(p(k, k_pi / 2) - centre).normalized();
+    add_disc(
+        mesh, centre, k == 0 ? Vector3d(-normal) : normal, [&](double angle) { return p(k, angle); },
+        material, k == 0);
+  }
 }
 
 struct MirrorStyle {
@@ -314,7 +334,7 @@ const std::vector<MirrorStyle>& mirror_styles() {
 double signed_power(double v, double exponent) { return std::copysign(std::pow(std::abs(v), exponent), v); }
 
 // A foot on the door at the origin, an arm, and a domed housing with a rim and a glass that faces the viewer
-// and the rear.
+// and the rear: three closed pieces.
 scene::Mesh mirror_mesh(const MirrorStyle& style) {
   scene::Mesh mesh;
   mesh.materials.clear();
@@ -328,29 +348,28 @@ scene::Mesh mirror_mesh(const MirrorStyle& style) {
     return Vector3d(style.centre + turn * Vector3d(x * scale * style.half_width,
                                                    y * scale * low * style.half_height, depth));
   };
-  add_rings(
-      mesh, 18,
-      [&](double k, double angle) {
-        const double rise = k * k_pi / 2;
-        return outline(angle, std::max(std::sin(rise), 1e-3), -style.depth * std::cos(rise));
-      },
-      paint);
-  add_rings(
-      mesh, 6,
-      [&](double k, double angle) {
-        return outline(angle, 1 - 0.10 * k, 0.004 * std::sin(k * k_pi) - 0.002 * k);
-      },
-      rim);
-  const auto glass_rim = [&](double angle) { return outline(angle, 0.905, -0.002); };
+  const auto dome = [&](double k, double angle) {
+    const double rise = k * k_pi / 2;
+    return outline(angle, std::max(std::sin(rise), 1e-3), k < 1 ? -style.depth * std::cos(rise) : 0);
+  };
+  add_rings(mesh, 18, dome, paint);
+  add_disc(
+      mesh, style.centre + turn * Vector3d(0, 0, -style.depth), turn * -Vector3d::UnitZ(),
+      [&](double angle) { return dome(0, angle); }, paint, true);
+  const auto rim_ring = [&](double k, double angle) {
+    return outline(angle, 1 - 0.10 * k, k < 1 ? 0.004 * std::sin(k * k_pi) - 0.002 * k : -0.002);
+  };
+  add_rings(mesh, 6, rim_ring, rim);
+  const auto glass_rim = [&](double angle) { return rim_ring(1, angle); };
   add_disc(mesh, style.centre + turn * Vector3d(0, 0, -0.0015), turn * Vector3d::UnitZ(), glass_rim, glass);
   const auto foot = [&](double k, double angle) {
     const double r = style.foot_radius * std::sqrt(std::max(1 - k * k, 1e-6));
     return Vector3d(r * std::cos(angle), 0.7 * r * std::sin(angle), 0.012 * k - 0.004);
   };
-  add_rings(mesh, 8, foot, arm);
+  add_closed_rings(mesh, 8, foot, arm);
   const Vector3d p_end = style.centre + turn * Vector3d(0, -0.35 * style.half_height, -0.6 * style.depth);
   const Vector3d p_bend(0.1 * p_end.x(), 0.25 * p_end.y(), 0.9 * p_end.z());
-  add_rings(
+  add_closed_rings(
       mesh, 16,
       [&](double k, double angle) {
         const Vector3d p = 2 * k * (1 - k) * p_bend + k * k * p_end;

@@ -159,6 +159,15 @@ Hit RayScene::first_hit(const Ray& ray) const {
   return {};
 }
 
+Hit RayScene::next_surface(const Ray& ray) const {
+  RTCRayHit query{};
+  query.ray =
+      ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), 0, std::numeric_limits<float>::infinity());
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  embree::intersect(impl_->scene, query);
+  return impl_->completed(query, ray.p_origin, ray.d);
+}
+
 void RayScene::first_hits(const Eigen::Vector3d& p_origin,
                           std::span<const Eigen::Vector3f> d,
                           std::span<Hit> hits) const {

@@ -42,6 +42,8 @@ class RayScene {
   /// The first hit of a ray. The ray passes through pieces below a material's alpha cutoff. first_hits() and
   /// reached() ignore the cutoff.
   Hit first_hit(const Ray& ray) const;
+  /// The first surface along a ray, also where a material's alpha is below its cutoff.
+  Hit next_surface(const Ray& ray) const;
   /// First hits of many rays from one point. Directions that are NaN hit nothing.
   void first_hits(const Eigen::Vector3d& p_origin,
                   std::span<const Eigen::Vector3f> d,

@@ -7,6 +7,7 @@
 
 #include "core/names.h"
 #include "core/result.h"
+#include "scene/meshes/closed_pieces.h"
 #include "sim/directions.h"
 #include "sim/texture.h"
 
@@ -52,6 +53,7 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
   if (const auto& room = parts.light ? parts.light : world.scene->light)
     light_ = {*room, image_sizes_of(*world.scene), true};
   finish_ = find_named(world.scene->finishes, parts.finish);
+  cut_ = parts.cut;
   if (const Object* prototype = world.find("prototype"))
     prototype_from_world_ = prototype->world_from_object.inverse();
   for (const scene::PosedPart& posed : parts.parts) {
@@ -59,8 +61,12 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
     LIMN_CHECK(slot != nullptr);
     const scene::Variant* variant = find_named(slot->variants, posed.variant);
     LIMN_CHECK(variant != nullptr);
+    const auto& section = world.scene->section;
+    const bool is_cut = parts.cut && section && section->cuts(slot->name);
     parts_.push_back({rays_of({&variant->mesh, posed.world_from_part}), &variant->mesh,
-                      slot->mode == scene::Mode::surface});
+                      slot->mode == scene::Mode::surface,
+                      1 + static_cast<int>(slot - world.scene->slots.data()), posed.world_from_part.inverse(),
+                      is_cut, is_cut ? scene::are_of_closed_pieces(variant->mesh) : std::vector<bool>()});
   }
 }
 
@@ -121,14 +127,64 @@ PartImage ReferenceRenderer::averaged(const Imager& imager, const SampleAt& samp
   return out;
 }
 
+// The first surface of a part that is kept, and how often the ray leaves closed pieces on the kept side more
+// than it enters them: that is how often they wind around the point where the ray meets the plane.
+Hit ReferenceRenderer::first_kept(const Part& part, const Ray& ray, int* windings) const {
+  constexpr double k_step = 1e-6;  // m; the ray goes on behind a surface after this distance
+  constexpr int k_most_surfaces = 4096;
+  Hit first;
+  *windings = 0;
+  double from = 0;
+  for (int count = 0; count < k_most_surfaces; ++count) {
+    Hit hit = part.rays.next_surface({ray.p_origin + from * ray.d, ray.d});
+    if (hit.object < 0) break;
+    hit.distance += from;
+    from = hit.distance + k_step;
+    if (height_over(*cut_, ray.p_origin + hit.distance * ray.d) > -scene::k_cut_margin_m) continue;
+    if (part.closed[static_cast<std::size_t>(hit.triangle)])
+      *windings += part.rays.face_normal(hit).dot(ray.d) > 0 ? 1 : -1;
+    if (first.object < 0 && !is_cut_out(*part.mesh, hit.triangle, part.rays.uv(hit))) first = hit;
+  }
+  return first;
+}
+
+// What a ray first meets of a part: its surface, or the cap where the plane cuts it open.
+ReferenceRenderer::Nearest ReferenceRenderer::first_of(std::size_t index, const Ray& ray) const {
+  const Part& part = parts_[index];
+  if (!part.is_cut) {
+    const Hit hit = part.rays.first_hit(ray);
+    return {hit.object < 0 ? -1 : static_cast<int>(index), hit};
+  }
+  int windings = 0;
+  const Hit hit = first_kept(part, ray, &windings);
+  const double to_plane = -height_over(*cut_, ray.p_origin) / cut_->normal.dot(ray.d);
+  const bool is_capped = windings != 0 && to_plane > 0 && std::isfinite(to_plane);
+  if (is_capped && (hit.object < 0 || to_plane < hit.distance)) {
+    Hit cap;
+    cap.object = 0;
+    cap.distance = to_plane;
+    return {static_cast<int>(index), cap, ray.p_origin + to_plane * ray.d};
+  }
+  return {hit.object < 0 ? -1 : static_cast<int>(index), hit};
+}
+
+// A cap with its lines. This function alone says what a cap looks like.
+Eigen::Vector3f ReferenceRenderer::cap_colour(const Part& part, const Eigen::Vector3d& p) const {
+  const scene::Section& section = *world_.scene->section;
+  const Eigen::Vector3d across =
+      scene::across_hatch(part.part_from_world.rotation * cut_->normal, part.owner);
+  const double phase = across.dot(part.part_from_world * p) / section.hatch_m;
+  const bool is_line = phase - std::floor(phase) < scene::k_hatch_line;
+  const Eigen::Vector3d bgr = section.cap_colour.reverse();
+  return ((is_line ? scene::k_hatch_colour : 1.0) * bgr).cast<float>();
+}
+
 ReferenceRenderer::Nearest ReferenceRenderer::nearest_part(const Ray& ray) const {
   Nearest nearest;
   nearest.hit.distance = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < parts_.size(); ++i) {
-    const Hit hit = parts_[i].rays.first_hit(ray);
-    if (hit.object < 0 || hit.distance >= nearest.hit.distance) continue;
-    nearest = {static_cast<int>(i), hit};
-  }
+  for (std::size_t i = 0; i < parts_.size(); ++i)
+    if (const Nearest found = first_of(i, ray); found.part >= 0 && found.hit.distance < nearest.hit.distance)
+      nearest = found;
   return nearest;
 }
 
@@ -149,6 +205,7 @@ Eigen::Vector3f ReferenceRenderer::radiance_along(const Eigen::Vector3d& d,
                                                   const Nearest& nearest,
                                                   const PartsLight& light) const {
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
+  if (nearest.p_cap) return cap_colour(part, *nearest.p_cap);
   const SurfaceMaterial material = material_at(part, nearest.hit);
   if (material.is_unlit) return material.base.cast<float>();
   const Eigen::Vector3d face = turned_against(part.rays.face_normal(nearest.hit), d);
@@ -202,7 +259,10 @@ ReferenceRenderer::Sample ReferenceRenderer::surface_sample(const Eigen::Vector3
   for (std::size_t i = 0; i < parts_.size(); ++i) {
     if (!parts_[i].on_surface) continue;
     for (const double side : {-1.0, 1.0}) {
-      const Hit hit = parts_[i].rays.first_hit({p + side * k_on_surface * n, -side * n});
+      const Ray ray{p + side * k_on_surface * n, -side * n};
+      int windings = 0;
+      const Hit hit =
+          parts_[i].is_cut ? first_kept(parts_[i], ray, &windings) : parts_[i].rays.first_hit(ray);
       const double height = std::abs(k_on_surface - hit.distance);
       if (hit.object < 0 || height > best_height) continue;
       best = {static_cast<int>(i), hit};
@@ -276,7 +336,7 @@ ReferenceRenderer::Sample ReferenceRenderer::parts_along(const Ray& ray, const P
   if (nearest.part < 0 || is_hidden(nearest, ray, prototype))
     return finish_sample(prototype, ray, ray.p_origin, light);
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
-  if (part.on_surface)
+  if (part.on_surface && !nearest.p_cap)
     return {nearest.part, radiance_on_surface(nearest, part.rays.shading_normal(nearest.hit))};
   return {nearest.part, radiance_along(ray.d, nearest, light)};
 }

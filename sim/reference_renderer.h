@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/imager.h"
@@ -53,6 +54,10 @@ class ReferenceRenderer {
     RayScene rays;
     const scene::Mesh* mesh;
     bool on_surface;
+    int owner;  // the slot's index + 1
+    Pose part_from_world;
+    bool is_cut;
+    std::vector<bool> closed;  // for each triangle, whether its piece closes; only of a part that is cut
   };
   struct Sample {
     int part = -1;
@@ -61,6 +66,7 @@ class ReferenceRenderer {
   struct Nearest {
     int part = -1;
     Hit hit;
+    std::optional<Eigen::Vector3d> p_cap = {};  // where a cap is met; then `hit` has no triangle
   };
   template <class SampleAt>
   static PartImage averaged(const Imager& imager, const SampleAt& sample_at);
@@ -70,6 +76,9 @@ class ReferenceRenderer {
                        const Ray& ray,
                        const Eigen::Vector3d& p_eye,
                        const PartsLight& light) const;
+  Nearest first_of(std::size_t part, const Ray& ray) const;
+  Hit first_kept(const Part& part, const Ray& ray, int* windings) const;
+  Eigen::Vector3f cap_colour(const Part& part, const Eigen::Vector3d& p) const;
   static SurfaceMaterial material_at(const Part& part, const Hit& hit);
   Nearest nearest_part(const Ray& ray) const;
   bool is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const;
@@ -86,6 +95,7 @@ class ReferenceRenderer {
   RayScene prototype_;
   std::vector<Part> parts_;
   const scene::Finish* finish_ = nullptr;  // null: none
+  std::optional<scene::CutPlane> cut_;     // in the world
   Pose prototype_from_world_;
   Eigen::Vector3d p_viewer_;
   PartsLight light_;
