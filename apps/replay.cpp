@@ -9,6 +9,7 @@
 #include <optional>
 #include <thread>
 
+#include "core/file.h"
 #include "core/log.h"
 #include "device/gl_context.h"
 #include "device/window.h"
@@ -39,10 +40,11 @@ Result<Events> load_events(const fs::path& path) {
     Json event = Json::parse(line, nullptr, false);
     if (event.is_discarded() || !event.is_object() ||
         !(event.contains("watch") || event.contains("edit") || event.contains("paint") ||
-          event.contains("scene") || event.contains("rig") || event.contains("eye") ||
-          event.contains("dark"))) {
+          event.contains("scene") || event.contains("rig") || event.contains("deviation") ||
+          event.contains("eye") || event.contains("dark"))) {
       events.damage = fmt::format(
-          "{}:{}: expected an event (watch, edit, eye, dark, scene, rig, paint), found something else",
+          "{}:{}: expected an event (watch, edit, eye, dark, scene, rig, deviation, paint), found something "
+          "else",
           path.string(), events.all.size() + 1);
       break;
     }
@@ -54,7 +56,7 @@ Result<Events> load_events(const fs::path& path) {
 // The number of moments whose frames had been perceived when an event happened, if the event depends on it; 0
 // for others.
 std::size_t known_moments(const Json& event) {
-  const bool depends = event.contains("paint") || event.contains("rig");
+  const bool depends = event.contains("paint") || event.contains("rig") || event.contains("deviation");
   return depends ? event.at("moments").get<std::size_t>() : event.value("moments", std::size_t{0});
 }
 
@@ -174,6 +176,7 @@ class Recording final : public session::FrameClock, public session::FrameSource 
     if (event.contains("watch")) unwatched_.push_back(&event);
     if (event.contains("scene")) return replace_scene(event.at("scene"));
     if (event.contains("rig")) return replace_rig(event.at("rig"));
+    if (event.contains("deviation")) return show_deviation(event.at("deviation"));
     if (event.contains("edit")) return edit(event.at("edit"), event.at("source"));
     if (event.contains("eye")) replay_tablet(event.at("eye"));
     if (event.contains("dark")) session_->set_dark_projectors(event.at("dark"));
@@ -193,6 +196,15 @@ class Recording final : public session::FrameClock, public session::FrameSource 
     LIMN_TRY_STATUS(session_->replace_rig(std::move(rig), session_->percepts().captured_at));
     const session::SessionSetup& setup = session_->setup();
     LIMN_TRY(*perception_, perception_->successor(setup.scene, setup.rig));
+    return {};
+  }
+
+  Status show_deviation(const std::string& file) {
+    LIMN_TRY(const fs::path path, inside(file));
+    LIMN_TRY(const std::string bytes, read_file(path));
+    auto layer = scene::deviation_layer_of(bytes);
+    if (!layer) return error("{}: {}", path.string(), layer.message());
+    session_->show_deviation(std::make_shared<const scene::DeviationLayer>(std::move(*layer)));
     return {};
   }
 

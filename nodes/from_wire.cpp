@@ -72,6 +72,7 @@ class WireReading {
   static MarkerName marker(const limn_v1_Marker& in) { return {text(in.family), text(in.id)}; }
   static scene::PosedPart part(const limn_v1_PosedPart& in);
   static scene::RoomLight light(const limn_v1_RoomLight& in);
+  static scene::DrawnLine line(const limn_v1_DrawnLine& in);
   static scene::PosedScene posed(const limn_v1_PosedScene& in);
   static tracker::Detection detection(const limn_v1_DetectedMarker& in);
   static tracker::Ball ball(const limn_v1_DetectedBall& in);
@@ -154,6 +155,17 @@ scene::RoomLight WireReading::light(const limn_v1_RoomLight& in) {
   return out;
 }
 
+scene::DrawnLine WireReading::line(const limn_v1_DrawnLine& in) {
+  scene::DrawnLine out;
+  out.name = text(in.name);
+  out.style = {vector(in.colour), in.width_m};
+  out.curve.is_closed = in.is_closed;
+  out.curve.points = list(in.points, [](const limn_v1_SurfacePoint& point) {
+    return scene::SurfacePoint{vector(point.p), vector(point.d_normal)};
+  });
+  return out;
+}
+
 scene::PosedScene WireReading::posed(const limn_v1_PosedScene& in) {
   scene::PosedScene out;
   out.world_from_prototype = optional(in.world_from_prototype, &WireReading::pose);
@@ -166,6 +178,9 @@ scene::PosedScene WireReading::posed(const limn_v1_PosedScene& in) {
   out.cut = optional(in.cut, [](const limn_v1_CutPlane& cut) {
     return scene::CutPlane{vector(cut.normal), cut.offset_m};
   });
+  out.lines = list(in.lines, &WireReading::text);
+  out.drawn = list(in.drawn, &WireReading::line);
+  out.deviation = {in.deviation_layer, in.deviation_tolerance_m};
   return out;
 }
 

@@ -102,6 +102,18 @@ void check(const scene::PosedPart& part, MessageCheck* to) {
   to->finite("part.material", {part.material.metallic.value_or(0), part.material.roughness.value_or(0)});
 }
 
+void check(const scene::DrawnLine& line, std::size_t* points, MessageCheck* to) {
+  to->text("line.name", line.name);
+  to->finite_matrix("line.colour", line.style.colour);
+  to->finite("line.width", {line.style.width_m});
+  *points += line.curve.points.size();
+  to->require(*points <= scene::k_most_points_shown, "line.points", "fewer points");
+  for (const scene::SurfacePoint& point : line.curve.points) {
+    to->finite_matrix("line.points", point.p);
+    to->finite_matrix("line.points", point.d_normal);
+  }
+}
+
 void check(const scene::PosedScene& posed, MessageCheck* to) {
   if (posed.world_from_prototype) to->pose("posed.world_from_prototype", *posed.world_from_prototype);
   to->count("posed.parts", posed.parts);
@@ -115,6 +127,12 @@ void check(const scene::PosedScene& posed, MessageCheck* to) {
   if (posed.light) check(*posed.light, to);
   to->text("posed.finish", posed.finish);
   if (posed.cut) to->require(scene::is_plane(*posed.cut), "posed.cut", "a plane with a normal of length 1");
+  to->count("posed.lines", posed.lines, scene::k_most_lines);
+  for (const std::string& line : posed.lines) to->text("posed.lines", line);
+  to->count("posed.drawn", posed.drawn);
+  std::size_t points = 0;
+  for (const scene::DrawnLine& line : posed.drawn) check(line, &points, to);
+  to->finite("posed.deviation", {posed.deviation.tolerance_m});
 }
 
 void check(const Track& track, MessageCheck* to) {

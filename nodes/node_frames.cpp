@@ -40,6 +40,7 @@ Result<std::unique_ptr<NodeFrames>> NodeFrames::create(LoadedSetup setup,
   LIMN_TRY(session::FrameDrawer drawer,
            session::FrameDrawer::create(&session.scene, &session.rig, session::draw_options(session.paint)));
   out->drawer_ = std::make_unique<session::FrameDrawer>(std::move(drawer));
+  out->drawer_->use_deviation(session.deviation);
   return out;
 }
 

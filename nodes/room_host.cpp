@@ -109,12 +109,16 @@ void RoomHost::publish_state(const session::SessionMoment& moment) {
     if (const Status sent = send_setup(revisions_, sharing_.get()); !sent)
       moment.session.warn(moment.at, fmt::format("the nodes did not get the change: {}", sent.message()));
   }
-  if (sharing_.valid() || moment.session.scenes() == scenes_) return;
+  const auto& deviation = moment.session.show_state().deviation.layer;
+  if (sharing_.valid() || (moment.session.scenes() == scenes_ && deviation == deviation_)) return;
   // Frames are already made for the new setup; nodes wait for it with their last images.
   scenes_ = moment.session.scenes();
+  deviation_ = deviation;
   ++revisions_;
+  session::SessionSetup setup = moment.session.setup();
+  setup.deviation = deviation;
   sharing_ = std::async(std::launch::async,
-                        [files = files_, setup = moment.session.setup(), folder = folder_of(revisions_)] {
+                        [files = files_, setup = std::move(setup), folder = folder_of(revisions_)] {
                           return shared_files(files, setup, folder);
                         });
 }

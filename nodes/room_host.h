@@ -66,7 +66,8 @@ class RoomHost final : public session::SessionClient {
   std::vector<std::string> projectors_;  // that nodes have
   Setup setup_;
   std::uint64_t frames_ = 0;
-  session::FrameDescription last_;  // the last one that was sent
+  std::shared_ptr<const scene::DeviationLayer> deviation_;  // what nodes have or will have
+  session::FrameDescription last_;                          // the last one that was sent
   std::uint64_t revisions_ = 1;
   std::future<Result<std::vector<SharedFile>>> sharing_;  // for the newest revision
   int scenes_ = 1;                                        // Session::scenes() of the setup that was sent

@@ -49,6 +49,7 @@ class WireFilling {
   void part(const scene::PosedPart& in, limn_v1_PosedPart* out);
   void light(const scene::RoomLight& in, limn_v1_RoomLight* out);
   void posed(const scene::PosedScene& in, limn_v1_PosedScene* out);
+  void line(const scene::DrawnLine& in, limn_v1_DrawnLine* out);
   static void track(const Track& in, limn_v1_Track* out);
 
   void overlay(const projector::SplitOverlay& in, limn_v1_Overlay* out);
@@ -184,6 +185,21 @@ void WireFilling::posed(const scene::PosedScene& in, limn_v1_PosedScene* out) {
   optional(in.cut, &out->cut, [this](const scene::CutPlane& item, limn_v1_CutPlane* to) {
     vector(item.normal, &to->normal);
     to->offset_m = item.offset_m;
+  });
+  list(in.lines, &out->lines, &WireFilling::text);
+  list(in.drawn, &out->drawn, [this](const auto& item, auto* to) { line(item, to); });
+  out->deviation_layer = in.deviation.layer;
+  out->deviation_tolerance_m = in.deviation.tolerance_m;
+}
+
+void WireFilling::line(const scene::DrawnLine& in, limn_v1_DrawnLine* out) {
+  text(in.name, &out->name);
+  vector(in.style.colour, &out->colour);
+  out->width_m = in.style.width_m;
+  out->is_closed = in.curve.is_closed;
+  list(in.curve.points, &out->points, [](const scene::SurfacePoint& point, limn_v1_SurfacePoint* to) {
+    vector(point.p, &to->p);
+    vector(point.d_normal, &to->d_normal);
   });
 }
 

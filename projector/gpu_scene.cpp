@@ -1,8 +1,10 @@
 #include "projector/gpu_scene.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <compare>
+#include <cstdint>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <span>
@@ -302,7 +304,7 @@ Status GpuScene::check_fits(const scene::Scene& scene, std::size_t most) {
       most, reinterpret_cast<const char*>(glGetString(GL_RENDERER)), count);
 }
 
-GpuScene::GpuScene(const scene::Scene& scene) : section_(scene.section) {
+GpuScene::GpuScene(const scene::Scene& scene) : section_(scene.section), volumes_(scene), lines_(scene) {
   Staging staging;
   const std::size_t count = triangles_of(scene);
   // The neighbours come first, so that their temporary memory is freed before the corners and normals need
@@ -328,6 +330,10 @@ GpuScene::GpuScene(const scene::Scene& scene) : section_(scene.section) {
   }
   has_room_image_ = scene.room_image.has_value();
   for (const scene::Finish& finish : scene.finishes) add_finish(finish, &staging);
+  constexpr int k_deviation = 8;  // as in shaders/deviation.glsl
+  add_finish({}, &staging);
+  staging.materials.back().second.z() = k_deviation;
+  deviation_words_ = buffer_of(std::vector<std::uint32_t>(1));
   corners_ = buffer_of(std::exchange(staging.corners, {}));  // each array is freed after its upload
   staging.normals.insert(staging.normals.end(), staging.after_normals.begin(), staging.after_normals.end());
   normals_ = buffer_of(std::exchange(staging.normals, {}));
@@ -502,8 +508,14 @@ void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* ru
     runs->push_back({0, &*prototype_, Pose()});
     const auto finish = std::find_if(finishes_.begin(), finishes_.end(),
                                      [&](const GpuFinish& known) { return known.name == posed.finish; });
-    if (finish != finishes_.end()) runs->back().finish = static_cast<int>(finish - finishes_.begin());
+    runs->back().lines = lines_.stamp();
     if (cut && section_->cuts_prototype) runs->back().cut = cut;
+    if (!posed.finish.empty() && finish != finishes_.end())
+      runs->back().finish = static_cast<int>(finish - finishes_.begin());
+    if (posed.deviation.layer != 0 && posed.deviation.layer == deviation_) {
+      runs->back().finish = static_cast<int>(finishes_.size()) - 1;
+      runs->back().deviation = posed.deviation;
+    }
   }
   for (const scene::PosedPart& part : posed.parts) {
     for (std::size_t i = 0; i < slots_.size(); ++i) {
@@ -511,8 +523,9 @@ void GpuScene::placed(const scene::PosedScene& posed, std::vector<PlacedRun>* ru
       const auto variant = slots_[i].variants.find(part.variant);
       LIMN_CHECK(variant != slots_[i].variants.end());
       runs->push_back({static_cast<int>(i) + 1, &variant->second, from_world * part.world_from_part,
-                       slots_[i].on_surface, -1, part.material});
+                       slots_[i].on_surface, -1, 0, part.material});
       if (cut && section_->cuts(part.slot)) runs->back().cut = cut;
+      runs->back().volume = volumes_.find(part.slot, part.variant, part.window);
     }
   }
 }
@@ -532,6 +545,7 @@ Eigen::Vector4f GpuScene::hatch_of(const PlacedRun& placed) const {
 void GpuScene::place(const std::vector<PlacedRun>& runs) {
   std::fill(gpu_owners_.begin(), gpu_owners_.end(), GpuOwner());
   cut_.reset();
+  volumes_.begin(owner_count());
   for (const PlacedRun& placed : runs) {
     GpuOwner& owner = gpu_owners_[static_cast<std::size_t>(placed.owner)];
     owner.owner_from_scene = placed.scene_from_owner.inverse().matrix().cast<float>();
@@ -542,13 +556,38 @@ void GpuScene::place(const std::vector<PlacedRun>& runs) {
     owner.metallic_roughness.y() = static_cast<float>(placed.material.roughness.value_or(-1));
     owner.hatch = hatch_of(placed);
     if (placed.cut) cut_ = placed.cut;
+    volumes_.place(placed.owner, placed.volume, placed.scene_from_owner.inverse());
     if (placed.finish < 0) continue;
     const GpuFinish& finish = finishes_[static_cast<std::size_t>(placed.finish)];
     owner.metallic_roughness.z() = static_cast<float>(finish.material + 1);
     owner.metallic_roughness.w() = finish.for_viewer ? 1 : 0;
+    if (placed.deviation.layer != 0) owner.colour.x() = static_cast<float>(placed.deviation.tolerance_m);
   }
   glNamedBufferSubData(*placements_, 0, static_cast<GLsizeiptr>(gpu_owners_.size() * sizeof(GpuOwner)),
                        gpu_owners_.data());
+  volumes_.upload();
+}
+
+void GpuScene::set_deviation(const scene::DeviationLayer& layer) {
+  if (!prototype_ || layer.triangles.size() != static_cast<std::size_t>(prototype_->count)) return;
+  constexpr std::size_t k_most_words =
+      (std::size_t{1} << 27) / sizeof(std::uint32_t);  // GL 4.5 guarantees it
+  if (3 * layer.band_colours.size() + 2 * layer.triangles.size() + layer.values.size() > k_most_words)
+    return log_warning("deviation: the CAD has too many triangles ({}) for colours in light.",
+                       layer.triangles.size());
+  // The layout of shaders/deviation.glsl: colours, triangles, values.
+  std::vector<std::uint32_t> words;
+  words.reserve(3 * layer.band_colours.size() + 2 * layer.triangles.size() + layer.values.size());
+  for (const Eigen::Vector3f& colour : layer.band_colours)
+    for (int i = 0; i < 3; ++i) words.push_back(std::bit_cast<std::uint32_t>(colour[i]));
+  const auto first = static_cast<std::uint32_t>(3 * layer.band_colours.size() + 2 * layer.triangles.size());
+  for (const scene::DeviationLayer::Triangle& triangle : layer.triangles) {
+    words.push_back(first + triangle.first);
+    words.push_back(triangle.divisions);
+  }
+  words.insert(words.end(), layer.values.begin(), layer.values.end());
+  deviation_words_ = buffer_of(words);
+  deviation_ = layer.number;
 }
 
 void GpuScene::bind(const Use& use) const {
@@ -558,9 +597,12 @@ void GpuScene::bind(const Use& use) const {
       {k_colour_maps_unit, &colour_maps_},   {k_surface_maps_unit, &maps_},
       {k_brdf_lut_unit, &brdf_lut_}};
   for (const auto& [unit, texture] : textures) glBindTextureUnit(static_cast<GLuint>(unit), **texture);
+  lines_.bind();
   glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_materials_buffer, *materials_);
+  glBindBufferBase(GL_SHADER_STORAGE_BUFFER, k_deviation_buffer, *deviation_words_);
   use.program.set("u_has_cut_outs", has_cut_outs_);
   use.program.set("u_placement_count", owner_count());
+  volumes_.bind();
   if (!section_) return;
   use.program.set("u_cut", coefficients(cut_));
   use.program.set("u_prototype_hatch",

@@ -10,6 +10,9 @@
 
 #include "core/result.h"
 #include "projector/resources.h"
+#include "projector/surface_lines.h"
+#include "projector/volume_stack.h"
+#include "scene/deviation_layer.h"
 #include "scene/posed_scene.h"
 
 namespace limn::projector {
@@ -40,9 +43,13 @@ struct PlacedRun {
   Pose scene_from_owner;
   bool on_surface = false;  ///< Whether its slot's mode is `surface`.
   int finish = -1;          ///< Index in the scene of the prototype's finish; -1: none.
+  unsigned lines = 0;       ///< Stamp of the lines on the prototype; 0: none (SurfaceLines::stamp).
   scene::MaterialOverride material = {};
   /// The plane that cuts it, in the scene's frame. The prototype is cut in views only.
   std::optional<scene::CutPlane> cut = {};
+  scene::PaintedDeviation deviation =
+      {};                     ///< What paints the prototype; its finish is then that of a deviation.
+  StackedVolume volume = {};  ///< What its cap shows.
 };
 
 /// All meshes of a scene on the GPU, in the layout that shaders/scene.glsl reads.
@@ -59,12 +66,17 @@ class GpuScene final : public Bindable {
   /// Writes the meshes that a posed scene shows to `runs`. Their poses are in the coordinate frame "scene",
   /// in which rays are cast: the prototype's frame if it is placed, else the world.
   void placed(const scene::PosedScene& posed, std::vector<PlacedRun>* runs) const;
+  /// Uploads the lines that a posed scene shows; before placed().
+  void place_lines(const scene::PosedScene& posed) { lines_.place(posed); }
   static Pose scene_from_world(const scene::PosedScene& posed);
   /// Uploads the poses.
   void place(const std::vector<PlacedRun>& runs);
   /// Whether the prototype is cut, too, in what is drawn from now on. Off by default.
   void cut_prototype(bool wanted) { is_prototype_cut_ = wanted; }
   bool is_prototype_cut() const { return is_prototype_cut_; }
+  /// Uploads the deviation from the CAD that posed scenes may show, instead of a former one. A layer for
+  /// another mesh is not shown.
+  void set_deviation(const scene::DeviationLayer& layer);
   /// Binds Resource::scene.
   void bind(const Use& use) const override;
 
@@ -77,9 +89,12 @@ class GpuScene final : public Bindable {
            (has_vertex_colours_ ? Defines{Define::vertex_colours} : Defines{}) +
            (has_room_image_ ? Defines{Define::room_image} : Defines{}) + section_defines();
   }
-  /// Define::section in a scene with a section.
-  Defines section_defines() const { return section_ ? Defines{Define::section} : Defines{}; }
-  /// The same for a prototype with a finish.
+  /// Define::section in a scene with a section, Define::volumes where it also has volumes.
+  Defines section_defines() const {
+    return (section_ ? Defines{Define::section} : Defines{}) +
+           (volumes_.is_empty() ? Defines{} : Defines{Define::volumes});
+  }
+  /// The same for a prototype with a finish or lines.
   Defines finish_defines() const {
     return shading_defines() + Defines{Define::finish} +
            (has_coated_finish_ ? Defines{Define::clearcoat} : Defines{});
@@ -118,16 +133,19 @@ class GpuScene final : public Bindable {
     int material = 0;  // index in the materials
     bool for_viewer = false;
   };
-  std::vector<GpuFinish> finishes_;
+  std::vector<GpuFinish> finishes_;  // the last one paints the deviation
+  int deviation_ = 0;                // number of the layer that was uploaded; 0: none
   bool has_cut_outs_ = false, has_surface_maps_ = false, has_clearcoat_ = false, has_second_uvs_ = false,
        has_coated_finish_ = false, has_vertex_colours_ = false, has_room_image_ = false;
   std::optional<scene::Section> section_;
   std::optional<scene::CutPlane> cut_;  // cuts the runs that were placed last
   bool is_prototype_cut_ = false;
+  VolumeStack volumes_;
   std::vector<GpuOwner> gpu_owners_;
+  SurfaceLines lines_;
   GlName corners_, normals_, triangles_, materials_, placements_, vertex_array_;
   GlName corner_texels_, normal_texels_, triangle_texels_, placement_texels_;  // texel views of the buffers
-  GlName colour_maps_, maps_, brdf_lut_;
+  GlName colour_maps_, maps_, brdf_lut_, deviation_words_;
 };
 
 /// The corners of a mesh's bounds, with a margin, in the scene's frame.

@@ -94,6 +94,7 @@ bool ImagerView::Overlay::keeps_other_pixels(const Imager& imager_now,
                                              const CompositeWeights& weights_now) const {
   return posed && weights == weights_now && is_same_prototype(*posed, posed_now) &&
          posed->light == posed_now.light && posed->finish == posed_now.finish &&
+         posed->deviation == posed_now.deviation &&
          is_same(imager.imager_from_world, imager_now.imager_from_world);
 }
 
@@ -126,7 +127,7 @@ void ImagerView::draw_parts(const Imager& imager,
   const bool is_view = overlay->is_view;
   scene.prepare(posed, is_view ? SceneCache::FromProjectors::nothing : SceneCache::FromProjectors::prototype);
   const GpuLens& lens = scene.lens_of(imager);
-  const bool sees_prototype = is_view || scene.has_finish();
+  const bool sees_prototype = is_view || scene.is_painted();
   const double around_m = has_contact_shadow_ ? ContactShadow::k_reach : 0;
   const auto places_of = [&](const std::vector<PlacedRun>& runs) {
     return scene.visibility().visible_rects(imager, lens.baked, runs, scene.scene_from_world(),
@@ -152,7 +153,7 @@ void ImagerView::draw_parts(const Imager& imager,
     resources = resources.with(Resource::contact_shadow, *contact_shadow_);
   }
   parts_passes_.draw(
-      {.is_view = is_view, .is_shadowed = has_contact_shadow_, .is_painted = scene.has_finish()},
+      {.is_view = is_view, .is_shadowed = has_contact_shadow_, .is_painted = scene.is_painted()},
       {overlay->parts.texture, size}, places, smoothing_, resources, &shared_.times);
   overlay->runs = scene.runs();
   overlay->places = places_of(scene.runs());

@@ -27,7 +27,7 @@ class PartsPasses {
   struct What {
     bool is_view;      ///< A virtual camera's view, with the prototype; else parts over a camera's image.
     bool is_shadowed;  ///< With contact shadows; link_shadowed() must have been called.
-    bool is_painted;   ///< The prototype has a finish.
+    bool is_painted;   ///< The prototype has a finish or lines.
   };
   struct Target {
     const GlName& light;  ///< GL_RGBA32F
@@ -54,7 +54,8 @@ class PartsPasses {
   Status link_programs(bool is_shadowed, bool is_painted);
 
   Defines shading_defines_, finish_defines_;
-  // By contact shadows (1: with them), and by the prototype's finish (1: it has one); linked on demand.
+  // By contact shadows (1: with them), and by the prototype's paint (1: it has a finish or lines); linked on
+  // demand.
   std::array<std::array<std::optional<Both>, 2>, 2> programs_;
   ComputePass find_edges_;
   PixelList work_list_;      // first the pixels that may see something, then those at edges

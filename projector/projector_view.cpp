@@ -68,7 +68,7 @@ Result<ProjectorView> ProjectorView::create(const Shared& shared) {
   return view;
 }
 
-// Links the programs for a bare prototype, or those for one with a finish.
+// Links the programs for a bare prototype, or those for one with a finish or lines.
 Status ProjectorView::link_light(bool by_measurement, bool is_painted) {
   std::optional<LightPasses>& passes = light_passes_[by_measurement ? 1 : 0][is_painted ? 1 : 0];
   if (passes) return {};
@@ -95,15 +95,15 @@ const Smoothing& ProjectorView::smoothing(bool is_quick) const {
 
 LightPasses& ProjectorView::light_passes() {
   const bool by_measurement = shared_.balance.options().compensation == Compensation::measured;
-  const bool is_painted = shared_.scene.has_finish();
+  const bool is_painted = shared_.scene.is_painted();
   if (is_painted) LIMN_CHECK(link_light(by_measurement, true).ok());
   return *light_passes_[by_measurement ? 1 : 0][is_painted ? 1 : 0];
 }
 
-// Finds where there may be light: at the parts, or on the whole prototype with even black or a finish.
+// Finds where there may be light: at the parts, or on the whole prototype with even black, a finish or lines.
 void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
   const SceneCache& scene = shared_.scene;
-  if (shared_.balance.options().even_black || scene.has_finish()) {
+  if (shared_.balance.options().even_black || scene.is_painted()) {
     light_places_.clear();
     light_places_.both.push_back(
         scene.visibility().prototype_rect(index, scene.runs(), scene.scene_from_world()));

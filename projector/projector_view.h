@@ -83,7 +83,8 @@ class ProjectorView {
   void draw_display(std::size_t index, const Canvas& light, const Resources& resources);
 
   Shared shared_;
-  // By compensation (1: by measurement), and by the prototype's finish (1: it has one); linked on demand.
+  // By compensation (1: by measurement), and by the prototype's paint (1: it has a finish or lines); linked
+  // on demand.
   std::array<std::array<std::optional<LightPasses>, 2>, 2> light_passes_;
   ComputePass response_pass_;
   FullscreenPass points_pass_, blend_pass_;

@@ -77,6 +77,11 @@ void Renderer::set_occlusion(std::size_t index, const cv::Mat& map) {
   if (impl_->base->scene.occlusion().set(index, map)) impl_->projectors.invalidate();
 }
 
+void Renderer::set_deviation(const scene::DeviationLayer& layer) {
+  impl_->base->scene.set_deviation(layer);
+  impl_->projectors.invalidate();
+}
+
 void Renderer::set_smoothing(const Smoothing& smoothing) {
   LIMN_CHECK(smoothing.samples == 4 || smoothing.samples == 8);
   impl_->imagers.set_smoothing(smoothing);

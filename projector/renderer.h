@@ -11,6 +11,7 @@
 #include "projector/compensation.h"
 #include "projector/pass_times.h"
 #include "projector/shadow_detector.h"
+#include "scene/deviation_layer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 
@@ -70,6 +71,11 @@ class Renderer {
   /// projectors that reach the point give it. The blocked projector keeps at most 7 % of the light, so that
   /// cameras see when the shadow goes. Where no other projector reaches the point, it gives its full light.
   void set_occlusion(std::size_t index, const cv::Mat& map);
+
+  /// Sets the deviation from the CAD that is drawn while PosedScene::deviation names its number: below the
+  /// parts, instead of a finish, in light of its own that lamps do not shade. A layer for another mesh is not
+  /// drawn. Use another number for another layer.
+  void set_deviation(const scene::DeviationLayer& layer);
 
   /// Sets the smoothing of composites and views, from the next one on.
   void set_smoothing(const Smoothing& smoothing);

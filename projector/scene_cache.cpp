@@ -5,7 +5,8 @@
 namespace limn::projector {
 bool is_same(const PlacedRun& a, const PlacedRun& b) {
   return a.owner == b.owner && a.run == b.run && is_same(a.scene_from_owner, b.scene_from_owner) &&
-         a.material == b.material && a.finish == b.finish && a.cut == b.cut;
+         a.material == b.material && a.finish == b.finish && a.lines == b.lines && a.cut == b.cut &&
+         a.deviation == b.deviation && a.volume == b.volume;
 }
 
 bool is_same_lens(const Imager& a, const Imager& b) {
@@ -15,6 +16,7 @@ bool is_same_lens(const Imager& a, const Imager& b) {
 
 Result<SceneCache> SceneCache::create(const scene::Scene& scene, const Rig& rig, PassTimes* times) {
   LIMN_TRY_STATUS(GpuScene::check_fits(scene, GpuScene::most_triangles()));
+  LIMN_TRY_STATUS(VolumeStack::check_fits(scene));
   LIMN_TRY(VisibilityBuffers visibility, VisibilityBuffers::create(rig, scene.section.has_value()));
   return SceneCache(scene, rig, std::move(visibility), times);
 }
@@ -32,6 +34,7 @@ SceneCache::SceneCache(const scene::Scene& scene,
 void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) {
   if (!prepared_ || !is_same(*prepared_, posed)) {
     const bool stays = prepared_ && is_same_prototype(*prepared_, posed);
+    scene_.place_lines(posed);
     scene_.placed(posed, &runs_);
     scene_from_world_ = GpuScene::scene_from_world(posed);
     scene_.place(runs_);
@@ -58,8 +61,14 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
   are_surface_parts_drawn_ = true;
 }
 
-bool SceneCache::has_finish() const {
-  return std::any_of(runs_.begin(), runs_.end(), [](const PlacedRun& run) { return run.finish >= 0; });
+void SceneCache::set_deviation(const scene::DeviationLayer& layer) {
+  scene_.set_deviation(layer);
+  prepared_.reset();
+}
+
+bool SceneCache::is_painted() const {
+  return std::any_of(runs_.begin(), runs_.end(),
+                     [](const PlacedRun& run) { return run.finish >= 0 || run.lines != 0; });
 }
 
 void SceneCache::draw_from_viewer(const Imager& viewer) {

@@ -57,8 +57,10 @@ class SceneCache {
   const VisibilityBuffers& visibility() const { return visibility_; }
   OcclusionMaps& occlusion() { return occlusion_; }
   const std::vector<PlacedRun>& runs() const { return runs_; }
-  /// Whether the prepared scene's prototype has a finish.
-  bool has_finish() const;
+  /// GpuScene::set_deviation.
+  void set_deviation(const scene::DeviationLayer& layer);
+  /// Whether the prepared scene's prototype has a finish or lines, or shows its deviation.
+  bool is_painted() const;
   const Pose& scene_from_world() const { return scene_from_world_; }
   /// Version number for caches: never 0, and different after the prototype has moved or the occlusion has
   /// changed.

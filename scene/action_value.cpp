@@ -76,6 +76,45 @@ Result<ScreenChoice> read_screen(const Edit& edit) {
   return ScreenChoice{edit.slot, static_cast<Screen>(found - names.begin())};
 }
 
+Result<LineSwitch> read_line_switch(const Edit& edit) {
+  LIMN_TRY(const Switch wanted, read_switch(edit));
+  return LineSwitch{edit.slot, wanted};
+}
+
+Result<LineStroke> read_line_stroke(const Edit& edit) {
+  const auto wrong = [&] {
+    return error(
+        "{}: expected 'points' and x y z of each in mm, or 'rays', x y z of the eye and a direction for "
+        "each, at most "
+        "{}, found '{}'.",
+        edit.action, k_most_stroke_points, edit.value.substr(0, 60));
+  };
+  std::istringstream text(edit.value);
+  std::string kind;
+  text >> kind;
+  std::vector<Eigen::Vector3d> numbers;
+  for (Eigen::Vector3d v; text >> v.x();) {
+    if (!(text >> v.y() >> v.z()) || !v.allFinite() || v.cwiseAbs().maxCoeff() > k_most_place_mm * 10 ||
+        numbers.size() > k_most_stroke_points)
+      return wrong();
+    numbers.push_back(v);
+  }
+  LineStroke out{edit.slot, {}};
+  const bool is_rays = kind == "rays";
+  if ((!is_rays && kind != "points") || !text.eof() || numbers.size() < (is_rays ? 2U : 1U)) return wrong();
+  if (is_rays) {
+    out.stroke.p_camera = 1e-3 * numbers.front();
+    numbers.erase(numbers.begin());
+  }
+  for (const Eigen::Vector3d& v : numbers) {
+    if (is_rays && !(v.norm() > 1e-6)) return wrong();
+    out.stroke.points.push_back(is_rays ? v.normalized() : Eigen::Vector3d(1e-3 * v));
+  }
+  return out;
+}
+
+Result<LineName> read_line_name(const Edit& edit) { return LineName{edit.slot, edit.value}; }
+
 // A part's name may contain spaces: the unit is the last word.
 Result<PartUnit> read_part_unit(const Edit& edit) {
   const auto blank = edit.value.rfind(' ');
@@ -95,6 +134,9 @@ Result<std::optional<MarkerName>> read_marker(const Edit& edit) {
 
 Result<MaterialOverride> read_material(const Edit& edit) { return parse_material_override(edit.value); }
 
+Result<DeviationRequest> read_deviation(const Edit& edit) {
+  return parse_deviation_request(edit.action, edit.value);
+}
 Result<std::optional<GreyWindow>> read_window(const Edit& edit) { return parse_grey_window(edit.value); }
 
 Result<std::optional<LightNumbers>> read_light(const Edit& edit) {

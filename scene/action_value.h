@@ -8,6 +8,7 @@
 #include "core/marker.h"
 #include "core/pose.h"
 #include "core/result.h"
+#include "scene/deviation_request.h"
 #include "scene/material_override.h"
 #include "scene/meshes/mesh.h"
 #include "scene/room_light.h"
@@ -43,6 +44,22 @@ struct ScreenChoice {
   std::optional<Screen> shows;  ///< Absent: the content after the present one.
 };
 
+/// Which line of light is switched, and how.
+struct LineSwitch {
+  std::string line;  ///< A line of the scene or a drawn one; empty: all.
+  Switch wanted = Switch::toggle;
+};
+
+/// A change of a drawn line.
+struct LineStroke {
+  std::string line;  ///< Its name; empty: the line drawn last, or for draw_line a new one.
+  Stroke stroke;
+};
+struct LineName {
+  std::string line;  ///< As above.
+  std::string new_name;
+};
+
 /// The unit of length of a part whose file was put into a slot's folder.
 struct PartUnit {
   std::string words;  ///< The whole text as it was written.
@@ -59,9 +76,13 @@ using ActionValue = std::variant<std::monostate,
                                  Switch,
                                  SectionChange,
                                  ScreenChoice,
+                                 LineSwitch,
+                                 LineStroke,
+                                 LineName,
                                  PartUnit,
                                  std::optional<MarkerName>,
                                  MaterialOverride,
+                                 DeviationRequest,
                                  std::optional<GreyWindow>,
                                  std::optional<LightNumbers>>;
 
@@ -74,9 +95,13 @@ Result<Pose> read_place(const Edit& edit);                   ///< m
 Result<Switch> read_switch(const Edit& edit);
 Result<SectionChange> read_section_change(const Edit& edit);
 Result<ScreenChoice> read_screen(const Edit& edit);
+Result<LineSwitch> read_line_switch(const Edit& edit);
+Result<LineStroke> read_line_stroke(const Edit& edit);  ///< m
+Result<LineName> read_line_name(const Edit& edit);
 Result<PartUnit> read_part_unit(const Edit& edit);
 Result<std::optional<MarkerName>> read_marker(const Edit& edit);
 Result<MaterialOverride> read_material(const Edit& edit);
+Result<DeviationRequest> read_deviation(const Edit& edit);
 Result<std::optional<GreyWindow>> read_window(const Edit& edit);
 Result<std::optional<LightNumbers>> read_light(const Edit& edit);
 

@@ -5,6 +5,7 @@
 
 #include "core/names.h"
 #include "scene/command_text.h"
+#include "scene/drawn_lines.h"
 #include "scene/meshes/mesh.h"
 
 namespace limn::scene {
@@ -137,6 +138,58 @@ Status set_section(Change* change, SectionChange wanted) {
   return {};
 }
 
+std::vector<std::string> line_names(const Change& change) {
+  std::vector<std::string> names;
+  for (const Line& line : change.scene.lines) names.push_back(line.name);
+  for (const DrawnLine& line : change.show_state.drawn) names.push_back(line.name);
+  return names;
+}
+
+// Without a name, all lines go on or off together.
+Status set_line(Change* change, const LineSwitch& choice) {
+  std::vector<std::string>& shown = change->show_state.lines;
+  const std::vector<std::string> names = line_names(*change);
+  const bool is_all = choice.line.empty();
+  if (!is_all && std::find(names.begin(), names.end(), choice.line) == names.end())
+    return error("{}: expected one of the lines ({}), or no name for all, found '{}'.", change->name,
+                 listed(names), choice.line);
+  const bool is_on =
+      is_all ? !shown.empty() : std::find(shown.begin(), shown.end(), choice.line) != shown.end();
+  const bool wanted = choice.wanted == Switch::toggle ? !is_on : choice.wanted == Switch::on;
+  if (is_all) {
+    shown = wanted ? names : std::vector<std::string>();
+  } else {
+    std::erase(shown, choice.line);
+    if (wanted) shown.push_back(choice.line);
+  }
+  return {};
+}
+
+// The actions on drawn lines (drawn_lines.h).
+Status named(const Change& change, const Status& done) {
+  return done ? Status() : error("{}: {}", change.name, done.message());
+}
+
+Status draw(Change* change, const LineStroke& value) {
+  return named(*change, draw_line(change->scene, value.line, value.stroke, &change->show_state));
+}
+
+Status erase(Change* change, const LineName& value) {
+  return named(*change, erase_line(value.line, &change->show_state));
+}
+
+Status smooth(Change* change, const LineName& value) {
+  return named(*change, smooth_line(change->scene, value.line, &change->show_state));
+}
+
+Status pull(Change* change, const LineStroke& value) {
+  return named(*change, move_line(change->scene, value.line, value.stroke, &change->show_state));
+}
+
+Status rename(Change* change, const LineName& value) {
+  return named(*change, rename_line(change->scene, value.line, value.new_name, &change->show_state));
+}
+
 std::string unused_look_name(const ShowState& show_state) {
   for (int i = 1;; ++i)
     if (std::string name = fmt::format("look-{:02}", i); !find_look(show_state, name)) return name;
@@ -162,6 +215,8 @@ void take_edits_since(const Scene& scene, const ShowState& show_state, Look* loo
   look->finish = show_state.finish;
   if (!show_state.section.is_on) look->cut.reset();
   if (show_state.section.is_held && show_state.section.plane) look->cut = show_state.section.plane;
+  look->lines = show_state.lines;
+  look->drawn = shown_drawn_lines(show_state);
 }
 
 Status save_look(Change* change, const std::string& name) {
@@ -180,6 +235,12 @@ Status save_look(Change* change, const std::string& name) {
   look.light = posed.light;
   look.finish = posed.finish;
   if (posed.cut) look.cut = transformed(prototype_from_world, *posed.cut);
+  look.lines = posed.lines;
+  for (const DrawnLine& line : posed.drawn) {
+    if (find_named(change->scene.lines, line.name)) continue;  // an outline
+    look.drawn.push_back(line);
+    look.lines->push_back(line.name);
+  }
   if (!show_state.frozen) take_edits_since(change->scene, show_state, &look);
   if (!look.light) look.light = change->scene.light;
   remember_look(look.name, &show_state);
@@ -245,6 +306,60 @@ Status undelete_look(Change* change, std::monostate) {
 Status repair(Change* change, std::monostate) {
   if (!change->show_state.blackout) return {};
   return error("{}: expected light, found blackout. End the blackout first.", change->name);
+}
+
+bool needs_deviation(DeviationRequest::What what) {
+  using enum DeviationRequest::What;
+  return what == on || what == hold || what == report;
+}
+
+// The session measures; it is asked by the request itself.
+Status set_deviation(Change* change, const DeviationRequest& request) {
+  using enum DeviationRequest::What;
+  const auto& prototype = change->scene.prototype;
+  DeviationChoice& choice = change->show_state.deviation;
+  if (!prototype || prototype->mesh.triangles.empty())
+    return error(
+        "{}: expected a prototype with a CAD mesh to compare with, found none. Give scene.json a "
+        "prototype.",
+        change->name);
+  const bool scans = request.what == scan || (request.what == toggle && !choice.layer);
+  if (scans && change->show_state.blackout)
+    return error("{}: expected light, found blackout. End the blackout first.", change->name);
+  if (needs_deviation(request.what) && !choice.layer)
+    return error("{}: expected a result, found none. Scan the prototype first (deviation without a value).",
+                 change->name);
+  switch (request.what) {
+    case scan:
+      break;
+    case report:
+      break;
+    case on:
+      choice.is_shown = true;
+      break;
+    case off:
+      choice.is_shown = false;
+      break;
+    case toggle:
+      choice.is_shown = !choice.is_shown && choice.layer;
+      break;
+    case hold:
+      choice.is_held = true;
+      break;
+    case release:
+      choice.is_held = false;
+      break;
+    case fit_box:
+      choice.fit_box = request.box;
+      break;
+    case fit_all:
+      choice.fit_box.reset();
+      break;
+    case tolerance:
+      choice.tolerance_m = request.tolerance_m;
+      break;
+  }
+  return {};
 }
 
 Status set_light(Change* change, const std::optional<LightNumbers>& numbers) {
@@ -435,12 +550,57 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .what = "cuts parts open at the plane of the section's marker, or holds the plane",
      .keys = {Key{'C'}},
      .functions = k_by<read_section_change, set_section>},
+    {.id = ActionId::line,
+     .name = "line",
+     .role = work,
+     .argument_kind = on_off,
+     .value = "on, off or toggle",
+     .of = "a line; left out: all",
+     .what = "shows or hides a line of light on the prototype",
+     .keys = {Key{'I'}},
+     .functions = k_by<read_line_switch, set_line>},
+    {.id = ActionId::draw_line,
+     .name = "draw_line",
+     .role = work,
+     .argument_kind = text,
+     .value = "points and their x y z in mm, or rays and x y z of an eye and directions, on the prototype",
+     .of = "a drawn line; left out: a new one",
+     .what = "draws a line of light on",
+     .functions = k_by<read_line_stroke, draw>},
+    {.id = ActionId::erase_line,
+     .name = "erase_line",
+     .role = work,
+     .of = "a drawn line; left out: the last one",
+     .what = "removes a drawn line",
+     .functions = k_by<read_line_name, erase>},
+    {.id = ActionId::smooth_line,
+     .name = "smooth_line",
+     .role = work,
+     .of = "a drawn line; left out: the last one",
+     .what = "makes a drawn line smoother; its ends stay",
+     .functions = k_by<read_line_name, smooth>},
+    {.id = ActionId::move_line,
+     .name = "move_line",
+     .role = work,
+     .argument_kind = text,
+     .value = "the first place and the last, as for draw_line",
+     .of = "a drawn line; left out: the last one",
+     .what = "moves the place of a drawn line that is nearest to the first place to the last",
+     .functions = k_by<read_line_stroke, pull>},
+    {.id = ActionId::rename_line,
+     .name = "rename_line",
+     .role = work,
+     .argument_kind = text,
+     .value = "its new name",
+     .of = "a drawn line; left out: the last one",
+     .what = "gives a drawn line another name",
+     .functions = k_by<read_line_name, rename>},
     {.id = ActionId::save_look,
      .name = "save_look",
      .role = work,
      .argument_kind = maybe_text,
      .value = "a name; empty: look-01 and so on",
-     .what = "saves variants, poses, materials, windows, finish, light and cut, as JSON and PNG",
+     .what = "saves variants, poses, materials, windows, finish, lines, light and cut, as JSON and PNG",
      .keys = {Key{'S'}},
      .functions = k_by<read_text, save_look>},
     {.id = ActionId::restore_look,
@@ -505,6 +665,17 @@ constexpr std::array<Action, k_action_count> k_actions = {{
      .what =
          "measures a moved device with patterns on the prototype (about 15 s) and corrects the session's rig",
      .functions = k_by<read_nothing, repair>},
+    {.id = ActionId::deviation,
+     .name = "deviation",
+     .role = work,
+     .argument_kind = maybe_text,
+     .value =
+         "scan, on, off, toggle, hold on, hold off, fit X Y Z X Y Z (mm), fit off, tolerance MM, report; "
+         "empty: scan",
+     .what = "scans the prototype with patterns (20 s at most) and shows how far it is from its CAD",
+     .keys = {Key{'D'}},
+     .value_of_keys = "toggle",
+     .functions = k_by<read_deviation, set_deviation>},
     {.id = ActionId::light,
      .name = "light",
      .role = work,

@@ -110,6 +110,7 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
         {slot.name, chosen_variant(slot, i, variants), world_from_marker * slot.marker_from_part});
   }
   out.viewpoints = fixed_viewpoints(scene);
+  out.lines = first_lines(scene);
   for (std::size_t i = 0; i < scene.viewers.size(); ++i)
     if (const Track* track = scene.viewers[i].marker || scene.viewers[i].is_tracked
                                  ? find_track(tracks, viewer_body(i))
@@ -119,6 +120,28 @@ PosedScene posed(const Scene& scene, std::span<const Track> tracks, std::span<co
   return out;
 }
 
+void add_outlines(const Scene& scene, PosedScene* posed) {
+  if (!scene.outlines || !posed->world_from_prototype) return;
+  std::size_t points = 0;
+  for (const DrawnLine& line : posed->drawn) points += line.curve.points.size();
+  for (const Line& line : scene.lines) {
+    if (line.outline_of.empty() ||
+        std::find(posed->lines.begin(), posed->lines.end(), line.name) == posed->lines.end())
+      continue;
+    for (const PosedPart& part : posed->parts) {
+      const Slot* slot = part.slot == line.outline_of ? scene.find_slot(part.slot) : nullptr;
+      const Variant* variant = slot ? find_named(slot->variants, part.variant) : nullptr;
+      if (!variant) continue;
+      for (const SurfaceCurve& curve :
+           scene.outlines->of(part.slot + "/" + part.variant, variant->mesh,
+                              posed->world_from_prototype->inverse() * part.world_from_part)) {
+        points += curve.points.size();
+        if (points <= k_most_points_shown) posed->drawn.push_back({line.name, line.style, curve});
+      }
+    }
+  }
+}
+
 bool is_same_prototype(const PosedScene& a, const PosedScene& b) {
   if (a.world_from_prototype.has_value() != b.world_from_prototype.has_value()) return false;
   return !a.world_from_prototype || limn::is_same(*a.world_from_prototype, *b.world_from_prototype);
@@ -126,10 +149,11 @@ bool is_same_prototype(const PosedScene& a, const PosedScene& b) {
 
 bool is_same(const PosedScene& a, const PosedScene& b) {
   return is_same_prototype(a, b) && a.light == b.light && a.finish == b.finish && a.cut == b.cut &&
+         a.lines == b.lines && a.drawn == b.drawn && a.deviation == b.deviation &&
          std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
                     [](const PosedPart& p, const PosedPart& q) {
-                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material && p.window == q.window &&
-                             limn::is_same(p.world_from_part, q.world_from_part);
+                      return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&
+                             p.window == q.window && limn::is_same(p.world_from_part, q.world_from_part);
                     });
 }
 
@@ -179,7 +203,7 @@ std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed) {
 Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, ""));
   const ConfigNode root = config.root();
-  root.only({"schema", "world_from_prototype", "slots", "finish", "cut"});
+  root.only({"schema", "world_from_prototype", "slots", "finish", "cut", "lines"});
   PosedScene out;
   out.viewpoints = fixed_viewpoints(scene);
   if (const auto pose = root.find("world_from_prototype")) out.world_from_prototype = pose->pose();
@@ -187,6 +211,13 @@ Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& sc
   if (const auto cut = root.find("cut")) {
     out.cut = read_cut_plane(*cut);
     if (!scene.section) cut->problem("expected a scene with a section, found one without.");
+  }
+  out.lines = first_lines(scene);
+  if (const auto lines = root.find("lines")) {
+    std::vector<std::string> names;
+    for (const Line& line : scene.lines) names.push_back(line.name);
+    out.lines.clear();
+    for (const ConfigNode& item : lines->items()) out.lines.push_back(item.choice(names));
   }
   if (const auto slots = root.find("slots")) {
     for (const std::string& name : slots->keys()) {
@@ -199,6 +230,7 @@ Result<PosedScene> load_poses(const std::filesystem::path& path, const Scene& sc
     }
   }
   LIMN_TRY_STATUS(config.status());
+  add_outlines(scene, &out);
   return out;
 }
 

@@ -21,6 +21,13 @@ struct PosedPart {
   std::optional<GreyWindow> window = {};  ///< How its volume is shown; absent: as the scene or its file says.
 };
 
+/// The deviation from its CAD that paints the prototype (scene/deviation_layer.h).
+struct PaintedDeviation {
+  int layer = 0;           ///< DeviationLayer::number; 0: none.
+  double tolerance_m = 0;  ///< The colours change at 1, 2 and 4 times it.
+  bool operator==(const PaintedDeviation&) const = default;
+};
+
 /// A scene at a moment: where everything is and which variant each slot shows. A slot that is not seen, or
 /// whose track is lost, is absent.
 struct PosedScene {
@@ -31,6 +38,9 @@ struct PosedScene {
   std::string finish = {};                 ///< The prototype's finish, of Scene::finishes; empty: none.
   /// The plane that cuts what the scene's section names, in the world; absent: all is whole.
   std::optional<CutPlane> cut = {};
+  std::vector<std::string> lines = {};  ///< The lines that are shown, of Scene::lines.
+  std::vector<DrawnLine> drawn = {};    ///< Further lines that are shown, and outlines (add_outlines).
+  PaintedDeviation deviation = {};      ///< Instead of the finish.
 };
 
 /// The scene with the poses of the tracks (of `bodies(scene)`). `variants[i]` is the chosen variant of slot i
@@ -41,11 +51,16 @@ PosedScene posed(const Scene& scene,
                  std::span<const Track> tracks,
                  std::span<const std::string> variants = {});
 
+/// Adds the outlines of posed parts among the scene's lines to `drawn`, because they move with their parts.
+/// At most k_most_points_shown points are drawn in all.
+void add_outlines(const Scene& scene, PosedScene* posed);
+
 /// The tracks of the bodies that carry what is posed, without covariances: posed() of them gives these poses
 /// again, unless parts stick to the surface.
 std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed);
 
-/// Whether both look the same: the same poses, variants, materials, finish, light and cut, to the last bit.
+/// Whether both look the same: the same poses, variants, materials, finish, lines, light, cut and deviation,
+/// to the last bit.
 bool is_same(const PosedScene& a, const PosedScene& b);
 /// Whether the prototype is at the same pose in both.
 bool is_same_prototype(const PosedScene& a, const PosedScene& b);

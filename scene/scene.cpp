@@ -223,9 +223,10 @@ Control read_control(const ConfigNode& node, const Scene& scene) {
   if (const auto gesture = node.find("gesture")) control.gesture = k_gestures.read(*gesture);
   if (const auto slot = node.find("slot")) {
     control.slot = slot->text();
-    if (!scene.find_slot(control.slot)) {
-      slot->problem(fmt::format("expected the name of a slot, found '{}'.", control.slot));
-    }
+    const bool is_line = control.action == ActionId::line;
+    if (is_line ? find_named(scene.lines, control.slot) == nullptr : !scene.find_slot(control.slot))
+      slot->problem(
+          fmt::format("expected the name of a {}, found '{}'.", is_line ? "line" : "slot", control.slot));
   }
   return control;
 }
@@ -272,6 +273,28 @@ void read_section_of(const ConfigNode& node, Reader* reader, Scene* scene) {
   scene->controls.push_back(
       {section.marker, ActionId::section, "", Gesture::cover, k_section_changes.text(SectionChange::cover)});
   scene->section = std::move(section);
+}
+
+bool line_of_slot_exists(const Line& line, const Scene& scene) {
+  return line.outline_of.empty() || scene.find_slot(line.outline_of) != nullptr;
+}
+
+std::vector<Line> read_lines(const ConfigNode& node, const Scene& scene) {
+  std::vector<Line> lines;
+  for (const ConfigNode& item : node.items()) {
+    Line line = read_line(item);
+    if (find_named(lines, line.name))
+      item.at("name").problem(fmt::format("expected a unique name, found '{}' twice.", line.name));
+    lines.push_back(std::move(line));
+    if (lines.size() > k_most_lines)
+      node.problem(fmt::format("expected at most {} lines, found more.", k_most_lines));
+    if (lines.size() > k_most_lines) break;
+    if (!line_of_slot_exists(lines.back(), scene))
+      item.at("outline").at("slot").problem(
+          fmt::format("expected the name of a slot, found '{}'.", lines.back().outline_of));
+  }
+  if (!scene.prototype) node.problem("expected a prototype for the lines, found a scene without.");
+  return lines;
 }
 
 Imager read_viewer_imager(const ConfigNode& node) {
@@ -606,6 +629,10 @@ Status load_files(const Reader& reader,
     for (Finish& finish : scene->finishes)
       if (const Status image = load_finish_image(!scene->prototype->mesh.uvs.empty(), &finish); !image)
         return error("{}: finishes: {}", path.string(), image.message());
+    scene->drape = std::make_shared<const Drape>(scene->prototype->mesh);
+    scene->outlines = std::make_shared<const Outlines>(scene->drape);
+    if (const Status laid = lay_lines(*scene->drape, &scene->lines); !laid)
+      return error("{}: lines: {}", path.string(), laid.message());
   }
   if (scene->room_image)
     if (const Status image = load_room_image(&*scene->room_image); !image)
@@ -639,6 +666,13 @@ std::vector<std::string> finish_names(const Scene& scene) {
   return names;
 }
 
+std::vector<std::string> first_lines(const Scene& scene) {
+  std::vector<std::string> names;
+  for (const Line& line : scene.lines)
+    if (line.is_shown) names.push_back(line.name);
+  return names;
+}
+
 std::string to_text(const SkippedVariant& skipped) {
   return fmt::format("{} of slot {} is left out: {}", skipped.variant, skipped.slot, skipped.why);
 }
@@ -668,12 +702,13 @@ Result<Scene> load_scene(const fs::path& path,
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "prototype", "slots", "controls", "viewer", "light", "finishes", "section"});
+  root.only({"schema", "prototype", "slots", "controls", "viewer", "light", "finishes", "section", "lines"});
   Scene scene;
   Reader reader;
   scene.folder = config.folder();
   if (const auto node = root.find("prototype")) scene.prototype = read_prototype(*node, &reader);
   scene.slots = read_slots(root.at("slots"), &reader);
+  if (const auto node = root.find("lines")) scene.lines = read_lines(*node, scene);
   if (const auto controls = root.find("controls")) {
     for (const ConfigNode& item : controls->items()) scene.controls.push_back(read_control(item, scene));
   }

@@ -15,6 +15,9 @@
 #include "core/result.h"
 #include "scene/action_id.h"
 #include "scene/finish.h"
+#include "scene/lines/drape.h"
+#include "scene/lines/line.h"
+#include "scene/lines/outline.h"
 #include "scene/meshes/mesh.h"
 #include "scene/room_image.h"
 #include "scene/room_light.h"
@@ -95,9 +98,13 @@ struct Scene {
   std::filesystem::path folder;
   std::optional<Prototype> prototype;  ///< Absent: parts are shown over a camera image only.
   std::vector<Slot> slots;
-  std::vector<Control> controls;             ///< The last one is the section's marker, if there is a section.
-  std::vector<Viewer> viewers;               ///< Several share one viewpoint (scene/viewpoint.h).
-  std::vector<Finish> finishes = {};         ///< What the prototype can be painted with in light.
+  std::vector<Control> controls;      ///< The last one is the section's marker, if there is a section.
+  std::vector<Viewer> viewers;        ///< Several share one viewpoint (scene/viewpoint.h).
+  std::vector<Finish> finishes = {};  ///< What the prototype can be painted with in light.
+  std::vector<Line> lines = {};       ///< Lines of light on the prototype.
+  /// Lays further lines on the prototype; null in a scene that was not loaded, or has no prototype.
+  std::shared_ptr<const Drape> drape = {};
+  std::shared_ptr<const Outlines> outlines = {};  ///< The parts' outlines on the prototype; likewise null.
   std::optional<RoomLight> light;            ///< Absent: soft light and a lamp that move with the viewer.
   std::optional<RoomImage> room_image = {};  ///< What RoomLight::image_strength is about.
   std::optional<Section> section = {};       ///< What cuts parts open.
@@ -109,6 +116,8 @@ struct Scene {
 };
 
 std::vector<std::string> finish_names(const Scene& scene);
+/// The lines that a session shows at first.
+std::vector<std::string> first_lines(const Scene& scene);
 
 /// What is left out of a scene, and why: a variant whose mesh cannot be loaded, or (named by its whole file
 /// name) something in slots/ that is no variant.
@@ -122,13 +131,13 @@ std::string to_text(const SkippedVariant& skipped);
 /// Whether slots of which no variant can be loaded stay in the scene.
 enum class EmptySlots { left_out, kept };
 
-/// Reads a scene; `path` is the scene.json or its folder. Meshes and volumes in slots/NAME/ of the folder become
-/// variants of slot NAME, named after their files. The material variants of a file (KHR_materials_variants) become
-/// variants, too, named "NAME VARIANT"; NAME itself has the file's default materials. Their units are those
-/// of slots/NAME/units.json (limn.units/1), or those that the files state, or are guessed, with a message. A
-/// variant that cannot be loaded is an error. With `skipped_variants` it is instead left out and listed
-/// there; a slot without any variant is then left out with its controls. What is no variant in slots/ is
-/// listed there, too, or else reported as a warning.
+/// Reads a scene; `path` is the scene.json or its folder. Meshes and volumes in slots/NAME/ of the folder
+/// become variants of slot NAME, named after their files. The material variants of a file
+/// (KHR_materials_variants) become variants, too, named "NAME VARIANT"; NAME itself has the file's default
+/// materials. Their units are those of slots/NAME/units.json (limn.units/1), or those that the files state,
+/// or are guessed, with a message. A variant that cannot be loaded is an error. With `skipped_variants` it is
+/// instead left out and listed there; a slot without any variant is then left out with its controls. What is
+/// no variant in slots/ is listed there, too, or else reported as a warning.
 Result<Scene> load_scene(const std::filesystem::path& path,
                          std::vector<SkippedVariant>* skipped_variants = nullptr,
                          EmptySlots empty_slots = EmptySlots::left_out);

@@ -42,8 +42,8 @@ struct Section {
   double hatch_m = 0.006;          ///< Distance between the lines on a cap.
   Eigen::Vector3d cap_colour = {0.72, 0.62, 0.42};  ///< Linear red, green and blue; not shaded.
 
-  /// Width and height of a white card on which the marker is: the slices of volumes are painted on it in light.
-  /// Its middle is the origin of the plane's frame, x right, y down. Absent: there is none.
+  /// Width and height of a white card on which the marker is: the slices of volumes are painted on it in
+  /// light. Its middle is the origin of the plane's frame, x right, y down. Absent: there is none.
   std::optional<Eigen::Vector2d> card_size_m = {};
 
   bool cuts(const std::string& slot) const;

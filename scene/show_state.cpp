@@ -69,6 +69,7 @@ ShowState initial_show_state(const Scene& scene) {
   ShowState show_state;
   for (const Slot& slot : scene.slots) show_state.slots.push_back({slot.variants.front().name, {}, {}, {}});
   for (ShowState::Slot& slot : show_state.slots) slot.nudge.setZero();
+  show_state.lines = first_lines(scene);
   return show_state;
 }
 
@@ -115,8 +116,25 @@ ShowState with_look(const Scene& scene, ShowState show_state, const Look& look) 
   } else {
     show_state.section = changed(show_state.section, SectionChange::off);
   }
+  show_state.lines = look.lines.value_or(first_lines(scene));
+  for (const DrawnLine& line : look.drawn) {
+    std::erase_if(show_state.drawn, [&](const DrawnLine& known) { return known.name == line.name; });
+    show_state.drawn.push_back(line);
+  }
+  std::erase_if(show_state.lines, [&](const std::string& name) {  // it may have been removed since
+    return !find_named(scene.lines, name) && !find_named(show_state.drawn, name);
+  });
   remember_look(look.name, &show_state);
   return show_state;
+}
+
+std::vector<DrawnLine> shown_drawn_lines(const ShowState& show_state) {
+  std::vector<DrawnLine> shown;
+  for (const DrawnLine& line : show_state.drawn)
+    if (line.curve.points.size() >= 2 &&
+        std::find(show_state.lines.begin(), show_state.lines.end(), line.name) != show_state.lines.end())
+      shown.push_back(line);
+  return shown;
 }
 
 Screen screen_content(const ShowState& show_state, const std::string& screen) {
@@ -281,6 +299,13 @@ PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::s
   out.finish = show_state.finish;
   out.cut =
       cut_of(scene, show_state.section, tracks, has_base ? std::optional(world_from_base) : std::nullopt);
+  out.lines.clear();
+  for (const std::string& name : show_state.lines)
+    if (find_named(scene.lines, name)) out.lines.push_back(name);
+  out.drawn = shown_drawn_lines(show_state);
+  add_outlines(scene, &out);
+  if (const DeviationChoice& deviation = show_state.deviation; deviation.is_shown && deviation.layer)
+    out.deviation = {deviation.layer->number, deviation.tolerance_m};
   return out;
 }
 
@@ -294,6 +319,8 @@ std::string look_json(const Look& look) {
     if (part.window) slot["window"] = to_json(*part.window);
   }
   if (!look.finish.empty()) json["finish"] = look.finish;
+  if (look.lines) json["lines"] = *look.lines;
+  for (const DrawnLine& line : look.drawn) json["drawn"].push_back(to_json(line));
   if (look.light) json["light"] = to_json(*look.light);
   if (look.cut) {
     const Eigen::Vector3d& n = look.cut->normal;
@@ -305,7 +332,7 @@ std::string look_json(const Look& look) {
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
   LIMN_TRY(const Config config, Config::load(path, "limn.look/1"));
   const ConfigNode root = config.root();
-  root.only({"schema", "name", "slots", "light", "finish", "cut"});
+  root.only({"schema", "name", "slots", "light", "finish", "cut", "lines", "drawn"});
   Look look;
   look.name = root.at("name").text();
   if (!is_look_name(look.name))
@@ -326,6 +353,12 @@ Result<Look> load_look(const std::filesystem::path& path, const Scene& scene) {
     if (const auto window = node.find("window")) look.parts.back().window = read_grey_window(*window);
   }
   if (const auto light = root.find("light")) look.light = read_room_light(*light);
+  if (const auto lines = root.find("lines")) {
+    look.lines.emplace();
+    for (const ConfigNode& item : lines->items()) look.lines->push_back(item.text());
+  }
+  if (const auto drawn = root.find("drawn"))
+    for (const ConfigNode& item : drawn->items()) look.drawn.push_back(read_drawn_line(item));
   if (const auto finish = root.find("finish")) look.finish = finish->choice(finish_names(scene));
   if (const auto cut = root.find("cut")) look.cut = read_cut_plane(*cut);
   LIMN_TRY_STATUS(config.status());

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -7,6 +9,7 @@
 
 #include "core/result.h"
 #include "core/track.h"
+#include "scene/deviation_layer.h"
 #include "scene/posed_scene.h"
 #include "scene/scene.h"
 
@@ -38,6 +41,9 @@ struct Look {
   std::string finish = {};              ///< The prototype's finish; empty: none.
   /// The plane that cuts parts, in the prototype's frame, as the poses; absent: all is whole.
   std::optional<CutPlane> cut = {};
+  /// The names of the lines that it shows; absent in older files: those that the scene shows at first.
+  std::optional<std::vector<std::string>> lines = {};
+  std::vector<DrawnLine> drawn = {};  ///< The drawn ones among these lines.
 };
 
 /// A part's pose that is held until its marker is moved.
@@ -53,14 +59,24 @@ struct Output {
   Screen shows = Screen::rest;
 };
 
+/// How the prototype is compared with its CAD, and whether the result is shown (action `deviation`).
+struct DeviationChoice {
+  std::shared_ptr<const DeviationLayer> layer;  ///< The newest result; null: there is none.
+  bool is_shown = false;                        ///< Only with a result.
+  bool is_held = false;                         ///< Later scans keep the alignment of the newest result.
+  /// The alignment is refined on the scan inside this box (prototype's frame, m).
+  std::optional<Eigen::AlignedBox3d> fit_box = {};
+  double tolerance_m = 0.5e-3;
+};
+
 /// What people have chosen during a session, in addition to the project's files.
 struct ShowState {
   struct Slot {
     std::string variant;
     Eigen::Vector3d nudge = Eigen::Vector3d::Zero();  ///< Shift along the part's own axes, m.
     std::optional<Pin> pin;
-    std::optional<MarkerName> marker;  ///< Marker that carries the part instead of the scene's own.
-    MaterialOverride material = {};    ///< Applies to all variants of the slot.
+    std::optional<MarkerName> marker;       ///< Marker that carries the part instead of the scene's own.
+    MaterialOverride material = {};         ///< Applies to all variants of the slot.
     std::optional<GreyWindow> window = {};  ///< Applies to all volumes of the slot; absent: each has its own.
   };
   std::vector<Slot> slots;  ///< In the scene's order.
@@ -79,6 +95,9 @@ struct ShowState {
   std::optional<RoomLight> light;    ///< Light instead of the scene's own.
   std::string finish;                ///< The prototype's finish, of Scene::finishes; empty: none.
   SectionState section = {};
+  std::vector<std::string> lines;  ///< The lines that are shown: names in Scene::lines and `drawn`.
+  std::vector<DrawnLine> drawn;    ///< Lines that were drawn in the session, or came with a look.
+  DeviationChoice deviation = {};  ///< Not part of looks.
   Eigen::Vector3d d_up_world = Eigen::Vector3d::UnitZ();      ///< Up for `light` if the scene has no light.
   Eigen::Vector3d d_front_world = -Eigen::Vector3d::UnitY();  ///< Towards the viewers, for `light`.
   /// A guest for whose tablet `view` parts are drawn; empty: the scene's own viewers.
@@ -94,8 +113,10 @@ std::vector<std::string> look_names(const ShowState& show_state);
 bool is_look_name(const std::string& name);
 /// The look of that name; null when there is none.
 const Look* find_look(const ShowState& show_state, const std::string& name);
-/// The show state with the look's variants, poses, materials, finish, light and cut, which is held. The look
-/// becomes the one last shown.
+/// The drawn lines that are shown.
+std::vector<DrawnLine> shown_drawn_lines(const ShowState& show_state);
+/// The show state with the look's variants, poses, materials, finish, lines, light and cut, which is held.
+/// The look becomes the one last shown.
 ShowState with_look(const Scene& scene, ShowState show_state, const Look& look);
 /// Makes it the look last shown; the former one becomes `other_look`.
 void remember_look(const std::string& name, ShowState* show_state);
@@ -129,8 +150,8 @@ ShowState without_moved_pins(const Scene& scene, const ShowState& show_state, st
 ShowState with_section_seen(const Scene& scene, ShowState show_state, std::span<const Track> tracks);
 
 /// The scene at a moment, from tracks (of assign_tracks()) and the show state: posed() with the chosen
-/// variants, nudges, pins, materials, finish and light. The cut follows the section's marker while it is seen
-/// and was within k_section_follows_s; else it is the plane that is held or was seen last.
+/// variants, nudges, pins, materials, finish, lines and light. The cut follows the section's marker while it
+/// is seen and was within k_section_follows_s; else it is the plane that is held or was seen last.
 PosedScene compose_scene(const Scene& scene, const ShowState& show_state, std::span<const Track> tracks);
 
 /// Seconds after its newest image for which the section's marker is predicted; later its plane stays.
@@ -147,8 +168,8 @@ std::string pairings_json(const Scene& scene, const ShowState& show_state);
 Result<ShowState> with_pairings(const std::filesystem::path& path, const Scene& scene, ShowState show_state);
 
 /// The text of a limn.look/1 file; load_look() reads it. A look without materials or light uses those of the
-/// project's files. Error: unknown slots, variants or finishes, or numbers that are not a pose, material or
-/// light.
+/// project's files. Error: unknown slots, variants or finishes, points that are no line, or
+/// numbers that are not a pose, material or light.
 std::string look_json(const Look& look);
 Result<Look> load_look(const std::filesystem::path& path, const Scene& scene);
 

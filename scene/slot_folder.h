@@ -15,7 +15,7 @@ struct SlotFolder {
   };
   /// Files of meshes and volumes, and folders of DICOM slices, in the order of their names.
   std::vector<std::filesystem::path> meshes;
-  std::vector<Other> others;                  ///< In the order of their names.
+  std::vector<Other> others;  ///< In the order of their names.
 };
 
 /// Whether it is a volume: a NIfTI file, or a folder with DICOM slices.

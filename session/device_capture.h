@@ -7,13 +7,13 @@
 
 #include "core/rig.h"
 #include "session/camera_threads.h"
+#include "session/capture_stage.h"
 #include "session/device_session.h"
 #include "session/perception_thread.h"
-#include "session/recalibration_stage.h"
 
 namespace limn::session {
 
-/// Gives a live recalibration access to the cameras and displays of a session on devices. The session shows
+/// Gives captures of a session access to the cameras and displays of a session on devices. The session shows
 /// frames again while the result is computed.
 class DeviceCapture final : public CaptureDevices {
  public:

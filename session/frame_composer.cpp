@@ -7,6 +7,7 @@
 
 #include "core/names.h"
 #include "projector/overlays/marker_signs.h"
+#include "session/deviation/deviation_signs.h"
 #include "session/drawing/card_slice.h"
 #include "session/stillness.h"
 
@@ -126,6 +127,7 @@ const FrameDescription& FrameComposer::describe(const FrameInput& input) {
   if (const auto p_middle = scene::middle_of(subject_->scene, frame_.posed))
     keep_cut_still(fading_.faded(), *p_middle, &frame_.posed);
   fading_.note(subject_->scene, frame_.posed, show_state, input.times.shown_at);
+  frame_.deviation = show_state.deviation.is_shown ? show_state.deviation.layer : nullptr;
   frame_.fading = fading_.fading_parts(input.times.shown_at);
   frame_.gone = fading_.gone_scene(input.times.shown_at);
   select_viewpoint(input);
@@ -184,6 +186,7 @@ void FrameComposer::select_viewpoint(const FrameInput& input) {
 std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::ShowState& show_state) const {
   std::vector<projector::Overlay> out;
   if (!frame_.posed.world_from_prototype || show_state.blackout) return out;
+  if (frame_.deviation) add_deviation_marks(show_state, &out);
   if (const auto left = scene::left_of_split(subject_->scene, show_state))
     out.push_back(projector::SplitOverlay{scene::compose_scene(subject_->scene, *left, frame_.tracks),
                                           prototype_box_.center().x() + 1e-3 * show_state.split_mm});
@@ -199,6 +202,21 @@ std::vector<projector::Overlay> FrameComposer::surface_overlays(const scene::Sho
         out.push_back(std::move(sign));
   }
   return out;
+}
+
+// A ring and the millimetres at each place where the deviation is largest.
+void FrameComposer::add_deviation_marks(const scene::ShowState& show_state,
+                                        std::vector<projector::Overlay>* out) const {
+  const Pose& world_from_prototype = *frame_.posed.world_from_prototype;
+  const Eigen::Vector3d d_up = world_from_prototype.rotation.inverse() * show_state.d_up_world;
+  for (const DeviationSign& sign : deviation_signs(*frame_.deviation, prototype_box_, d_up)) {
+    const Pose world_from_mark = world_from_prototype * sign.prototype_from_mark;
+    const auto projector = best_projector(world_from_mark);
+    if (!projector) continue;
+    out->push_back(
+        projector::RingOverlay{*projector, world_from_mark, sign.size_m, cv::Scalar::all(255), k_sign});
+    if (sign.place) out->push_back(projector::SignOverlay{*projector, sign.image, *sign.place});
+  }
 }
 
 // Rings where a part was lost, for tracking states and for markers that wait for a part, and names of
@@ -291,8 +309,15 @@ EyeImages FrameComposer::screen(const Percepts& percepts,
     cameras.push_back({frame, scene::assign_tracks(subject_->scene, show_state, at_frame)});
     keep_still(fading_.faded().world_from_prototype, prototype_box_, &cameras.back().tracks);
   }
-  return screens_.images({cameras, show_state, viewpoints_.selected().viewer, fading_.faded()}, request,
-                         &drawer_.renderer());
+  const bool shows_deviation = show_state.deviation.is_shown && show_state.deviation.layer;
+  if (shows_deviation) drawer_.use_deviation(show_state.deviation.layer);
+  EyeImages images = screens_.images({cameras, show_state, viewpoints_.selected().viewer, fading_.faded()},
+                                     request, &drawer_.renderer());
+  if (shows_deviation && request.what != scene::Screen::camera)
+    for (cv::Mat* image : {&images.left, &images.right})
+      if (!image->empty())
+        *image = with_legend(*image, *show_state.deviation.layer, show_state.deviation.tolerance_m);
+  return images;
 }
 
 cv::Mat FrameComposer::free_surface(std::size_t projector) {

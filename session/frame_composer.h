@@ -107,6 +107,7 @@ class FrameComposer {
   void select_viewpoint(const FrameInput& input);
   std::vector<cv::Mat> arriving_light(std::span<const std::string> dark_projectors) const;
   std::vector<projector::Overlay> surface_overlays(const scene::ShowState& show_state) const;
+  void add_deviation_marks(const scene::ShowState& show_state, std::vector<projector::Overlay>* out) const;
   std::vector<projector::Overlay> marker_overlays(const FrameInput& input) const;
   void draw_projectors();
   std::optional<std::size_t> best_projector(const Pose& world_from_marker) const;

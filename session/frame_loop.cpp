@@ -10,7 +10,7 @@ namespace limn::session {
 FrameLoop::FrameLoop(SessionParts parts, FrameSetting setting)
     : parts_(std::move(parts)),
       setting_(setting),
-      recalibration_(&parts_.perception, &parts_.session, &parts_.output, setting.capture) {}
+      captures_(&parts_.perception, &parts_.session, &parts_.output, setting.capture) {}
 
 Status FrameLoop::run(const std::atomic<bool>& is_ended, const std::function<void()>& after_each) {
   while (!is_ended && !setting_.source.is_over()) {
@@ -25,9 +25,10 @@ Status FrameLoop::run(const std::atomic<bool>& is_ended, const std::function<voi
 Result<bool> FrameLoop::step() {
   Session& session = parts_.session;
 
-  // Recalibrate, if somebody has asked for it. No frames are composed while it uses the projectors.
-  recalibration_.step(setting_.clock);
-  if (recalibration_.holds_light()) {
+  // Capture, if somebody has asked for a repair or a scan. No frames are composed while it uses the
+  // projectors.
+  captures_.step(setting_.clock);
+  if (captures_.holds_light()) {
     apply_client_edits();
     note_devices();
     return publish_to_clients(nullptr, {});

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "core/result.h"
+#include "session/capture_stage.h"
 #include "session/device_health.h"
 #include "session/frame_input.h"
 #include "session/perception.h"
 #include "session/pose_feeds.h"
-#include "session/recalibration_stage.h"
 #include "session/screen_request.h"
 #include "session/session.h"
 #include "session/session_client.h"
@@ -83,7 +83,7 @@ struct FrameSetting {
   FrameSource& source;
   FrameSink& sink;
   DeviceHealth& health;
-  CaptureDevices* capture = nullptr;  ///< null: recalibration is not possible
+  CaptureDevices* capture = nullptr;  ///< null: captures are not possible
 };
 
 /// The frame loop: states what happens in a session, in which order.
@@ -106,7 +106,7 @@ class FrameLoop {
 
   SessionParts parts_;
   FrameSetting setting_;
-  RecalibrationStage recalibration_;
+  CaptureStage captures_;
   std::optional<Stamp> client_screen_at_;  // when a screen's image was last drawn for clients
 };
 

@@ -1,16 +1,11 @@
 #include "session/live_recalibration.h"
 
 #include "core/user_folder.h"
-#include "core/worker_thread.h"
 
 namespace limn::session {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr int k_niceness = 10;  // niceness of the computation, so that drawing has priority
-constexpr auto k_look_again = std::chrono::milliseconds(5);
-constexpr const char* k_ended = "the session was ended.";
 
 // A sentence about what has moved.
 std::string words_of(const calib::RigCheck& result, const fs::path& folder) {
@@ -42,14 +37,14 @@ Status mend(const Result<wizard::Rechecked>& checked,
 
 }  // namespace
 
-Result<fs::path> recalibration_folder(const fs::path& out) {
+Result<fs::path> numbered_folder(const fs::path& out, const std::string& name) {
   fs::path base = out;
   if (base.empty()) {
     LIMN_TRY(base, user_folder());
   }
   std::error_code none;
   for (int i = 1;; ++i) {
-    const fs::path folder = base / fmt::format("repaired-{}", i);
+    const fs::path folder = base / fmt::format("{}-{}", name, i);
     if (!fs::exists(folder, none)) return folder;
   }
 }
@@ -57,65 +52,13 @@ Result<fs::path> recalibration_folder(const fs::path& out) {
 LiveRecalibration::LiveRecalibration(const Rig& rig,
                                      fs::path folder,
                                      const std::function<wizard::WizardBackend(ImageWriter*)>& backend)
-    : folder_(std::move(folder)), images_(wizard::recheck_images(rig)) {
-  result_ = std::async(
-      std::launch::async,
-      [this, rig, backend = run_on_session_thread(backend(&writer_))]() -> Result<wizard::Rechecked> {
-        try {
-          return wizard::recheck_in_place(rig, backend, folder_, [this] { return !is_over_; });
-        } catch (const std::exception& bug) {
-          return error("this is a bug in Limn, please report it: {}", bug.what());
-        }
-      });
-}
-
-LiveRecalibration::~LiveRecalibration() {
-  is_over_ = true;
-  while (result_.valid() && result_.wait_for(k_look_again) != std::future_status::ready) executor_.serve();
-}
-
-// The same functions, executed by serve(). After cancellation they return errors.
-wizard::WizardBackend LiveRecalibration::run_on_session_thread(wizard::WizardBackend backend) {
-  wizard::WizardBackend out;
-  out.capture.show = [this, show = backend.capture.show](int projector, const cv::Mat& image) {
-    Status status = error("{}", k_ended);
-    executor_.run([&] {
-      if (is_over_) return;
-      status = show(projector, image);
-      ++shown_;
-    });
-    return status;
-  };
-  out.capture.grab = [this, grab = backend.capture.grab](int camera) {
-    Result<cv::Mat> image = error("{}", k_ended);
-    executor_.run([&] {
-      if (!is_over_) image = grab(camera);
-    });
-    return image;
-  };
-  out.capture.store = backend.capture.store;
-  out.use_latency = [this, use = backend.use_latency](int projector, double seconds) {
-    executor_.run([&] { use(projector, seconds); });
-  };
-  out.wait_for_files = [this, written = backend.wait_for_files] {
-    Status status = written();
-    step_back(k_niceness);
-    is_capturing_ = false;
-    return status;
-  };
-  return out;
-}
-
-std::string LiveRecalibration::words() const {
-  return is_capturing_ ? fmt::format("{} of {} patterns", shown_.load(), images_) : "computing";
-}
-
-std::optional<Result<wizard::Rechecked>> LiveRecalibration::take_result() {
-  if (!result_.valid() || result_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
-    return std::nullopt;
-  is_capturing_ = false;
-  return result_.get();
-}
+    : folder_(std::move(folder)),
+      task_(wizard::recheck_images(rig),
+            backend,
+            [rig, into = folder_](const wizard::WizardBackend& devices,
+                                  const std::function<bool()>& should_continue) {
+              return wizard::recheck_in_place(rig, devices, into, should_continue);
+            }) {}
 
 void apply_recalibration(const Result<wizard::Rechecked>& checked,
                          const fs::path& folder,

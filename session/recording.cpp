@@ -14,6 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* k_deviation_file = "deviation";
+
 constexpr std::size_t k_most_queued = 40;  // frames; 240 MB of colour 1920x1080
 
 std::int64_t nanoseconds(Stamp at) { return at.time_since_epoch().count(); }
@@ -116,6 +118,8 @@ Status save_setup(const SessionSetup& setup, const fs::path& folder) {
   LIMN_TRY_STATUS(make_folder(folder));
   LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
   LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
+  if (setup.deviation)
+    LIMN_TRY_STATUS(write_file(folder / k_deviation_file, scene::bytes_of(*setup.deviation)));
   return write_file(folder / "session.json", json_text(setup_json(setup), 2) + "\n");
 }
 
@@ -195,6 +199,15 @@ Rig Recorder::record_rig(Rig rig, std::size_t moments) {
   }
   write({{"rig", copy}, {"moments", moments}});
   return std::move(*read);
+}
+
+void Recorder::record_deviation(const scene::DeviationLayer& layer, std::size_t moments) {
+  const std::lock_guard lock(mutex_);
+  if (ended_) return;
+  const std::string file = fmt::format("deviation-{}", ++deviations_);
+  if (!write_file(folder_ / file, scene::bytes_of(layer)))
+    return end("the deviation from the CAD could not be written");
+  write({{"deviation", file}, {"moments", moments}});
 }
 
 void Recorder::record_edit(const scene::Edit& edit, const std::string& source, std::size_t moments) {
@@ -365,6 +378,11 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(setup.rig, load_rig(rig));
   std::vector<scene::SkippedVariant> skipped_variants;  // the session has left them out, too
   LIMN_TRY(setup.scene, scene::load_scene(scene, &skipped_variants));
+  if (!fs::exists(folder / k_deviation_file)) return setup;
+  LIMN_TRY(const std::string bytes, read_file(folder / k_deviation_file));
+  auto layer = scene::deviation_layer_of(bytes);
+  if (!layer) return error("{}: {}", (folder / k_deviation_file).string(), layer.message());
+  setup.deviation = std::make_shared<const scene::DeviationLayer>(std::move(*layer));
   return setup;
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <mutex>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -26,9 +27,12 @@ struct SessionSetup {
   PerceptionOptions watch;
   ComposeOptions paint;
   std::vector<std::string> screens = {};  ///< names of the displays that are not projectors
+  /// The newest deviation from the CAD, for machines that draw described frames; null: none.
+  std::shared_ptr<const scene::DeviationLayer> deviation = {};
 };
 
-/// Writes rig/, scene/ and session.json, which load_setup() reads. Error: the folder cannot be written.
+/// Writes rig/, scene/, session.json and, if there is one, the file `deviation`; load_setup() reads them.
+/// Error: the folder cannot be written.
 Status save_setup(const SessionSetup& setup, const std::filesystem::path& folder);
 
 /// Writes the recording of a session (limn.session/1): the rig and the scene as they were at its start; the
@@ -51,6 +55,8 @@ class Recorder {
   /// Records the rig that is used from now on; returns it as a replay will read it, to the last bit.
   /// `moments`: as in edited().
   Rig record_rig(Rig rig, std::size_t moments);
+  /// Records the deviation from the CAD that is shown from now on. `moments`: as in edited().
+  void record_deviation(const scene::DeviationLayer& layer, std::size_t moments);
   /// Records an edit. `moments`: the number of calls of watched() whose percepts the session had received.
   void record_edit(const scene::Edit& edit, const std::string& source, std::size_t moments);
   /// Records the position (world frame, m) of a guest's tablet that the viewpoint depends on; nullopt: it has
@@ -80,7 +86,7 @@ class Recorder {
   ImageWriter images_;
   mutable std::mutex mutex_;
   std::ofstream events_;
-  std::size_t frames_ = 0, scenes_ = 1, rigs_ = 1;
+  std::size_t frames_ = 0, scenes_ = 1, rigs_ = 1, deviations_ = 0;
   std::optional<std::string> ended_;
 };
 

@@ -54,6 +54,12 @@ Status check_same_markers(const scene::Scene& now, const scene::Scene& next) {
       (next.folder / "scene.json").string());
 }
 
+bool has_same_prototype(const scene::Scene& now, const scene::Scene& next) {
+  if (!now.prototype || !next.prototype) return now.prototype.has_value() == next.prototype.has_value();
+  const scene::Mesh &a = now.prototype->mesh, &b = next.prototype->mesh;
+  return a.triangles == b.triangles && a.positions == b.positions;
+}
+
 std::vector<scene::SkippedVariant> keep_old_variants(const scene::Scene& now, LoadedScene* loaded) {
   std::vector<scene::SkippedVariant> kept, left_out;
   for (const scene::SkippedVariant& skipped : loaded->skipped_variants) {
@@ -92,6 +98,11 @@ scene::ShowState with_variants_of(const scene::Scene& next,
     if (!is_in(shown, names)) shown = names.front();
   }
   if (!find_named(next.finishes, show_state.finish)) show_state.finish.clear();
+  std::erase_if(show_state.lines, [&](const std::string& name) {
+    return !find_named(next.lines, name) && !find_named(show_state.drawn, name);
+  });
+  for (const scene::Line& line : next.lines)
+    if (line.is_shown && !find_named(now.lines, line.name)) show_state.lines.push_back(line.name);
   return show_state;
 }
 

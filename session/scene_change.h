@@ -14,6 +14,9 @@ namespace limn::session {
 /// bodies, and the same controls. Error: what is different, and what to do.
 Status check_same_markers(const scene::Scene& now, const scene::Scene& next);
 
+/// Whether the prototypes of both have the same mesh.
+bool has_same_prototype(const scene::Scene& now, const scene::Scene& next);
+
 /// Gives each variant that `now` has and that can no longer be loaded its old mesh, and moves it from
 /// `loaded`'s list to the result. Slots that then have no variant are left out.
 std::vector<scene::SkippedVariant> keep_old_variants(const scene::Scene& now, LoadedScene* loaded);

@@ -103,11 +103,36 @@ Status Session::edit(const scene::Edit& wanted, const std::string& source, Stamp
   last_edit_ = Edited{edit, source, last_edit_ ? last_edit_->count + 1 : 1};
   if (recorder_) recorder_->record_edit(edit, source, moments_);
   if (command.action == scene::ActionId::repair) recalibration_.is_requested = true;
+  if (const auto* request = std::get_if<scene::DeviationRequest>(&command.value)) request_deviation(*request);
   if (telemetry_)
     telemetry_->note(at, fmt::format("{}{}{}{}{} ({})", edit.action, edit.slot.empty() ? "" : " ", edit.slot,
                                      edit.value.empty() ? "" : " ", edit.value, source));
   store_.keep(setup_.scene, changed, show_state_, command, [this] { return screen(scene::Screen::view); });
   return {};
+}
+
+// `show_state_` is the one after the request.
+void Session::request_deviation(const scene::DeviationRequest& request) {
+  using enum scene::DeviationRequest::What;
+  const bool has_result = show_state_.deviation.layer != nullptr;
+  if (request.what == scan || (request.what == toggle && !has_result)) deviation_.is_scan_requested = true;
+  if (request.what == report) deviation_.is_report_requested = true;
+  if (request.what == fit_box || request.what == fit_all || request.what == tolerance)
+    deviation_.is_comparison_requested |= has_result;
+}
+
+// Its values belong to another mesh.
+void Session::forget_deviation() {
+  show_state_.deviation.layer.reset();
+  show_state_.deviation.is_shown = show_state_.deviation.is_held = false;
+  deviation_.result.reset();
+  deviation_.text.clear();
+}
+
+void Session::show_deviation(std::shared_ptr<const scene::DeviationLayer> layer) {
+  if (recorder_) recorder_->record_deviation(*layer, moments_);
+  show_state_.deviation.layer = std::move(layer);
+  show_state_.deviation.is_shown = true;
 }
 
 void Session::note_tablet(const std::string& guest,
@@ -132,6 +157,7 @@ Status Session::replace_scene(scene::Scene scene, Stamp at) {
   if (recorder_) recorder_->record_scene(scene);
   if (telemetry_) telemetry_->note(at, "the scene's files have changed; the scene was loaded again");
   composer_.replace(std::move(composer));
+  if (!has_same_prototype(setup_.scene, scene)) forget_deviation();
   setup_.scene = std::move(scene);
   ++scenes_;
   ask_units();

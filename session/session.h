@@ -27,10 +27,22 @@
 
 namespace limn::session {
 
+struct PrototypeComparison;
+
 /// A repair (session/live_recalibration.h) that somebody asked for, and how far it is.
 struct RecalibrationStatus {
   bool is_requested = false;
   std::string progress;  ///< for people; empty: none is running
+};
+
+/// The comparison of the prototype with its CAD (session/deviation_job.h): what somebody asked for, how far
+/// it is, and the newest result.
+struct DeviationStatus {
+  bool is_scan_requested = false, is_comparison_requested = false, is_report_requested = false;
+  std::string progress;                               ///< for people; empty: nothing runs
+  std::shared_ptr<const PrototypeComparison> result;  ///< null: there is none
+  std::string text;                                   ///< the result in words
+  std::filesystem::path report;                       ///< folder of the newest report; empty: none
 };
 
 /// An edit that was applied, and who sent it.
@@ -81,6 +93,11 @@ class Session {
   /// Requests for a repair, and its progress.
   RecalibrationStatus& recalibration() { return recalibration_; }
   const RecalibrationStatus& recalibration() const { return recalibration_; }
+  /// Requests for a comparison with the CAD, its progress and its result.
+  DeviationStatus& deviation() { return deviation_; }
+  const DeviationStatus& deviation() const { return deviation_; }
+  /// Shows a deviation from the CAD from now on.
+  void show_deviation(std::shared_ptr<const scene::DeviationLayer> layer);
   /// The drift that was last reported.
   const std::optional<Drift>& drift() const { return drift_.reported(); }
   /// What the session leaves out to keep real time, as a sentence for people; empty: nothing.
@@ -137,6 +154,8 @@ class Session {
   ShownFrame measured() const;
 
  private:
+  void request_deviation(const scene::DeviationRequest& request);
+  void forget_deviation();
   Session(
       SessionSetup setup, FrameComposer composer, Telemetry* telemetry, Recorder* recorder, bool keeps_looks);
   void ask_units();
@@ -155,6 +174,7 @@ class Session {
   DriftNotices drift_;
   tracker::SwappedCamerasCheck swapped_;
   RecalibrationStatus recalibration_;
+  DeviationStatus deviation_;
   std::string pace_;
   int scenes_ = 1;
   std::optional<Edited> last_edit_;

@@ -27,6 +27,9 @@ const int k_depth_unit = 20;         // depth buffer of a projector's ids
 const int k_depth_edges_unit = 21;   // as k_depth_edges_image
 const int k_room_image_unit = 22;    // a picture of the room as surfaces reflect it
 const int k_cap_count_unit = 23;     // how often each texel's ray enters and leaves a part behind a cut
+const int k_lines_unit = 24;         // lines of light on the prototype
+const int k_volumes_unit = 25;       // the values of volumes
+const int k_volume_places_unit = 26;  // where parts are in them
 
 // Image units; GL 4.5 guarantees eight.
 const int k_target_image = 0;         // the image that a pass draws
@@ -39,6 +42,7 @@ const int k_edge_fade_image = 6;      // as k_edge_fade_unit
 
 // Storage buffers; GL 4.5 guarantees eight.
 const int k_materials_buffer = 3;
+const int k_deviation_buffer = 4;        // the prototype's deviation from its CAD
 const int k_deferred_list_buffer = 5;    // pixels that a pass leaves to a later one
 const int k_work_list_buffer = 6;        // pixels that a pass lists or processes
 const int k_distance_fields_buffer = 7;  // bounds and places of the distance fields of parts

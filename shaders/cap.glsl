@@ -9,9 +9,33 @@ float line_share(float phase, float width) {
   return covered / width;
 }
 
+#ifdef VOLUMES
+layout(binding = k_volumes_unit) uniform sampler3D s_volumes;
+// 5 for each owner: three rows whose products with (p, 1), scene frame, are the coordinates in s_volumes; the least
+// coordinates, w: 1 / width of the grey window, or 0 without a volume; the greatest coordinates, w: the value that is
+// black.
+layout(binding = k_volume_places_unit) uniform samplerBuffer s_volume_places;
+
+// The slice of the owner's volume at p, as grey by its window; grey is sRGB. a: 0 without a volume.
+vec4 slice_at(uint owner, vec3 p) {
+  int first = 5 * int(owner);
+  vec4 lower = texelFetch(s_volume_places, first + 3), upper = texelFetch(s_volume_places, first + 4), q = vec4(p, 1);
+  if (lower.w == 0.0) return vec4(0);
+  vec3 at = vec3(dot(texelFetch(s_volume_places, first), q), dot(texelFetch(s_volume_places, first + 1), q),
+                 dot(texelFetch(s_volume_places, first + 2), q));
+  float value = textureLod(s_volumes, clamp(at, lower.xyz, upper.xyz), 0.0).r;
+  float grey = clamp((value - upper.w) * lower.w, 0.0, 1.0);
+  return vec4(vec3(grey <= 0.04045 ? grey / 12.92 : pow((grey + 0.055) / 1.055, 2.4)), 1);
+}
+#endif
+
 // The colour of the cap of `owner` at p, seen along d, linear light; `footprint` is the side (m) of a pixel's patch
 // across d. This function alone says what a cap looks like.
 vec3 cap_colour(uint owner, vec3 p, vec3 d, float footprint) {
+#ifdef VOLUMES
+  vec4 slice = slice_at(owner, p);
+  if (slice.a > 0.0) return slice.rgb;
+#endif
   vec4 hatch = hatch_of(owner);
   // The change of the phase from pixel to pixel: across d, on the plane.
   vec3 change = hatch.xyz - u_cut.xyz * dot(hatch.xyz, d) / dot(u_cut.xyz, d);

@@ -1,10 +1,13 @@
-// The finish of the whole prototype: a coat of paint in light, below the parts.
+// The paint of the whole prototype in light, below the parts: its finish, and the lines over it.
 #include "shading.glsl"
 
 #ifdef FINISH
+#include "deviation.glsl"
+#include "surface_lines.glsl"
+
 const int k_decal_image = 1, k_pattern_image = 2, k_projected_image = 4;  // bits of Material.second.z; 0: no image
 
-bool has_finish() { return true; }
+bool has_finish() { return owner_at(0u).metallic_roughness.z > 0.5; }
 bool is_finish_for_viewer() { return owner_at(0u).metallic_roughness.w > 0.5; }
 
 // The colour at the prototype's point p; `footprint` is the side (m) of the pixel's patch there.
@@ -35,14 +38,45 @@ SurfaceMaterial finish_at(Hit prototype, vec3 p, float footprint) {
                          is_diffuse, 1.0, vec3(0), finish.coat.x, finish.coat.y, n, n, n);
 }
 
-// Its light at p, seen along the ray direction d; n_side is a normal on the side that is seen.
-vec3 finish_light(Hit prototype, vec3 p, vec3 n_side, vec3 d, float footprint) {
+vec3 painted_light(Hit prototype, vec3 p, vec3 n_side, vec3 d, float footprint) {
   SurfaceMaterial surface = finish_at(prototype, p, footprint);
   float side = dot(surface.n_smooth, n_side) < 0.0 ? -1.0 : 1.0;
   if (is_finish_for_viewer() && dot(n_side, d) < 0.0) return shaded(turned_to_viewer(surface, side, d), -d);
   return light_on_surface(surface, side * surface.n_smooth);
 }
+
+// Its light at p, seen along the ray direction d; n_side is a normal on the side that is seen; d_ray is the
+// direction of the imager's own ray. a: 0 where it paints nothing.
+vec4 finish_light(Hit prototype, vec3 p, vec3 n_side, vec3 d, vec3 d_ray, float footprint) {
+  Material finish = s_materials[uint(owner_at(0u).metallic_roughness.z) - 1u];
+  if ((finish.second.z & k_deviation) != 0) return deviation_colour(prototype, p, smooth_normal(prototype), d_ray);
+  return vec4(painted_light(prototype, p, n_side, d, footprint), 1);
+}
+
+// The lines at p, seen along the ray direction d of the imager that is drawn; n_side as above.
+vec4 lines_light(Hit prototype, vec3 p, vec3 n_side, vec3 d, float footprint) {
+  uint first = 3u * (prototype.id - 1u);
+  vec3 a = corner(first).xyz;
+  vec3 d_winding = cross(corner(first + 1u).xyz - a, corner(first + 2u).xyz - a);
+  return lines_at(Patch(p, n_side, d, footprint), d_winding);
+}
+
+bool is_painted() { return true; }
+
+// For passes that draw several samples in a pixel.
+void draw_sharp_lines() { g_line_softness = 0.3; }
+
+// Finish and lines: light, multiplied by the share of the patch that has any, and that share. d_viewer: the ray that
+// the finish is seen along; d: that of the imager that is drawn.
+vec4 paint_light(Hit prototype, vec3 p, vec3 n_side, vec3 d_viewer, vec3 d, float footprint) {
+  vec4 lines = lines_light(prototype, p, n_side, d, footprint);
+  if (!has_finish() || lines.a == 1.0) return lines;
+  vec4 finish = finish_light(prototype, p, n_side, d_viewer, d, footprint);
+  return lines + (1.0 - lines.a) * vec4(finish.a * finish.rgb, finish.a);
+}
 #else
 bool has_finish() { return false; }
-vec3 finish_light(Hit prototype, vec3 p, vec3 n_side, vec3 d, float footprint) { return vec3(0); }
+bool is_painted() { return false; }
+void draw_sharp_lines() {}
+vec4 paint_light(Hit prototype, vec3 p, vec3 n_side, vec3 d_viewer, vec3 d, float footprint) { return vec4(0); }
 #endif

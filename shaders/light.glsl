@@ -71,9 +71,11 @@ vec4 wanted_colour(Hit prototype, Place place, float t) {
   if (colour.a == 0.0) colour = surface_colour(place, footprint);
 #endif
 #ifdef FINISH
-  if (colour.a == 0.0 && has_finish()) {
-    vec3 d = normalize(place.p - viewpoint_at(u_viewer).p_origin.xyz);
-    colour = vec4(finish_light(prototype, place.p, place.d_flat, d, footprint), 1);
+  if (colour.a == 0.0) {
+    vec3 d_viewer = normalize(place.p - viewpoint_at(u_viewer).p_origin.xyz);
+    vec3 d = normalize(place.p - viewpoint_at(u_projector).p_origin.xyz);
+    vec4 paint = paint_light(prototype, place.p, place.d_flat, d_viewer, d, footprint);
+    if (paint.a > 0.0) colour = vec4(paint.rgb, 1);
   }
 #endif
   return colour;
@@ -105,13 +107,21 @@ vec4 light_of(Sample s, Share share) {
 }
 
 // False only if the pixel's centre certainly gives no light: the viewer sees no part there, none lies on the
-// surface, and the prototype has no finish.
+// surface, and the prototype has neither a finish nor a line there.
 bool may_give_light(ivec2 at) {
   Hit prototype = cached_hit(at);
   if (prototype.id == 0u) return false;
   uint first = 3u * (prototype.id - 1u);
   vec3 p = mat3(corner(first).xyz, corner(first + 1u).xyz, corner(first + 2u).xyz) * prototype.weights;
   bool may_give = u_even_black || has_finish();
+#ifdef FINISH
+  if (!may_give) {
+    Viewpoint projector = viewpoint_at(u_projector);
+    vec3 d = ray_of(projector, vec2(at));
+    Place place = place_at(prototype, d);
+    may_give = lines_light(prototype, place.p, place.d_flat, d, prototype.t / projector.quality.x).a > 0.0;
+  }
+#endif
 #ifdef VIEW_PARTS
   vec4 share;
   Viewpoint viewer = viewpoint_at(u_viewer);

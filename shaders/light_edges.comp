@@ -12,6 +12,7 @@ layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 void main() {
   if (!has_work()) return;
   ivec2 at = work_pixel();
+  draw_sharp_lines();
   CentreShare centre = centre_share(at);
   vec4 sum = vec4(0);
   bool is_deferred = false;

@@ -16,34 +16,39 @@ vec4 shadow_at(vec3 d) {
   return vec4(0, 0, 0, contact_shadow(viewer.p_origin.xyz + prototype.t * d, facing_normal(prototype, d)));
 }
 
-// The prototype's finish along d where no part is seen, as a part that light shows where it reaches.
+// The prototype's paint along d where no part is seen, as a part that light shows where it reaches.
 // `is_full`: also draws what light can show.
-vec4 finish_behind_parts(vec3 d, bool is_full) {
+vec4 paint_behind_parts(vec3 d, bool is_full) {
   Viewpoint viewer = viewpoint_at(u_viewer);
   Hit prototype = first_hit(s_viewer_ids, viewer, 0, d);
   if (prototype.id == 0u) return vec4(0);
   float share = is_full ? 1.0 : full_weight(0u);
   Place place = place_at(prototype, d);
-  if (share < 1.0 && !is_reached(place)) share = 1.0;
-  if (share == 0.0) return k_contact_shadow ? shadow_at(d) : vec4(0);
   vec3 n = facing_normal(prototype, d);
+  vec4 paint = paint_light(prototype, place.p, n, d, d, prototype.t / viewer.quality.x);
+  if (paint.a > 0.0 && share < 1.0 && !is_reached(place)) share = 1.0;
   float shadow = k_contact_shadow ? contact_shadow(place.p, n) : 0.0;
-  return share * vec4((1.0 - shadow) * finish_light(prototype, place.p, n, d, prototype.t / viewer.quality.x), 1);
+  paint = share * paint;
+  return vec4((1.0 - shadow) * paint.rgb, paint.a + (1.0 - paint.a) * shadow);
 }
 
-// Whether a part or the finish at px must be shown by the screen.
+// Whether a part or the paint at px must be shown by the screen.
 bool is_left_to_screen(vec2 px) {
   VisiblePart visible = visible_part_at(px);
-  if (visible.shown_by == k_nothing && has_finish()) {
-    Hit prototype = first_hit(s_viewer_ids, viewpoint_at(u_viewer), 0, visible.d);
-    return prototype.id != 0u && !is_reached(place_at(prototype, visible.d));
+  if (visible.shown_by == k_nothing && is_painted()) {
+    Viewpoint viewer = viewpoint_at(u_viewer);
+    Hit prototype = first_hit(s_viewer_ids, viewer, 0, visible.d);
+    if (prototype.id == 0u) return false;
+    Place place = place_at(prototype, visible.d);
+    return paint_light(prototype, place.p, facing_normal(prototype, visible.d), visible.d, visible.d,
+                       prototype.t / viewer.quality.x).a > 0.0 && !is_reached(place);
   }
   return visible.shown_by == k_screen || (visible.shown_by == k_if_reached && !is_reached(visible.behind));
 }
 
 // `is_full`: also draws what light can show.
 vec4 composite_light(VisiblePart visible, bool is_full) {
-  if (visible.shown_by == k_nothing && has_finish()) return finish_behind_parts(visible.d, is_full);
+  if (visible.shown_by == k_nothing && is_painted()) return paint_behind_parts(visible.d, is_full);
   if (visible.shown_by == k_nothing) return k_contact_shadow ? shadow_at(visible.d) : vec4(0);
   float share = visible.shown_by == k_if_reached && !is_full ? full_weight(owner_of(visible.part.id)) : 1.0;
   if (share < 1.0 && !is_reached(visible.behind)) share = 1.0;

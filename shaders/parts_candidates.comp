@@ -12,7 +12,7 @@ void main() {
   Viewpoint viewer = viewpoint_at(u_viewer);
   vec3 d = ray_of(viewer, vec2(at));
   if (ids_around(s_viewer_ids, viewer, 1, d, share) != uvec4(0) ||
-      ((k_contact_shadow || has_finish()) && ids_around(s_viewer_ids, viewer, 0, d, share) != uvec4(0))) {
+      ((k_contact_shadow || is_painted()) && ids_around(s_viewer_ids, viewer, 0, d, share) != uvec4(0))) {
     add_to_work_list(at);
   }
 }

@@ -12,6 +12,7 @@ layout(rgba32f, binding = k_target_image) uniform writeonly image2D u_image;
 void main() {
   if (!has_work()) return;
   ivec2 at = work_pixel();
+  draw_sharp_lines();
   const float k_around = 3.0;  // width of the neighbourhood that is searched, pixels
   bool is_full = false;
   int k = 0;

@@ -25,10 +25,10 @@ vec4 view_at(vec2 px) {
     return vec4(cap_light(prototype, viewer.p_origin.xyz, d, prototype.t / viewer.quality.x), 1);
   vec3 n = facing_normal(prototype, d);
   float shadow = k_contact_shadow ? contact_shadow(viewer.p_origin.xyz + prototype.t * d, n) : 0.0;
-  if (has_finish())
-    return vec4((1.0 - shadow) * finish_light(prototype, viewer.p_origin.xyz + prototype.t * d, n, d,
-                                              prototype.t / viewer.quality.x), 1);
+  vec3 p = viewer.p_origin.xyz + prototype.t * d;
+  vec4 paint = paint_light(prototype, p, n, d, d, prototype.t / viewer.quality.x);
+  if (paint.a == 1.0) return vec4((1.0 - shadow) * paint.rgb, 1);
   vec2 uv = uv_of(prototype);
   vec3 colour = u_mean_albedo * texture(s_albedo, vec2(uv.x, 1.0 - uv.y)).rgb * diffuse_light(n);
-  return vec4((1.0 - shadow) * colour, 1);
+  return vec4((1.0 - shadow) * mix(colour, vec3(0), paint.a) + (1.0 - shadow) * paint.rgb, 1);
 }

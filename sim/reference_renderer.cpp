@@ -8,7 +8,9 @@
 #include "core/names.h"
 #include "core/result.h"
 #include "scene/meshes/closed_pieces.h"
+#include "scene/volume_part.h"
 #include "sim/directions.h"
+#include "sim/slice_light.h"
 #include "sim/texture.h"
 
 namespace limn::sim {
@@ -54,6 +56,7 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
     light_ = {*room, image_sizes_of(*world.scene), true};
   finish_ = find_named(world.scene->finishes, parts.finish);
   cut_ = parts.cut;
+  lines_ = ReferenceLines(*world.scene, parts);
   if (const Object* prototype = world.find("prototype"))
     prototype_from_world_ = prototype->world_from_object.inverse();
   for (const scene::PosedPart& posed : parts.parts) {
@@ -66,7 +69,8 @@ ReferenceRenderer::ReferenceRenderer(const World& world, const scene::PosedScene
     parts_.push_back({rays_of({&variant->mesh, posed.world_from_part}), &variant->mesh,
                       slot->mode == scene::Mode::surface,
                       1 + static_cast<int>(slot - world.scene->slots.data()), posed.world_from_part.inverse(),
-                      is_cut, is_cut ? scene::are_of_closed_pieces(variant->mesh) : std::vector<bool>()});
+                      is_cut, is_cut ? scene::are_of_closed_pieces(variant->mesh) : std::vector<bool>(),
+                      variant->volume.get(), scene::shown_window(*variant, posed.window)});
   }
 }
 
@@ -170,6 +174,9 @@ ReferenceRenderer::Nearest ReferenceRenderer::first_of(std::size_t index, const 
 
 // A cap with its lines. This function alone says what a cap looks like.
 Eigen::Vector3f ReferenceRenderer::cap_colour(const Part& part, const Eigen::Vector3d& p) const {
+  if (part.volume)
+    return Eigen::Vector3f::Constant(
+        static_cast<float>(slice_light(*part.volume, part.window, part.part_from_world * p)));
   const scene::Section& section = *world_.scene->section;
   const Eigen::Vector3d across =
       scene::across_hatch(part.part_from_world.rotation * cut_->normal, part.owner);
@@ -318,6 +325,19 @@ ReferenceRenderer::Sample ReferenceRenderer::finish_sample(const Hit& hit,
   return {part, material.base.cwiseProduct(from_front).cast<float>()};
 }
 
+// The line of light there, else the finish.
+ReferenceRenderer::Sample ReferenceRenderer::paint_sample(const Hit& hit,
+                                                          const Ray& ray,
+                                                          const Eigen::Vector3d& p_eye,
+                                                          const PartsLight& light) const {
+  if (hit.object < 0) return {};
+  const Eigen::Vector3d p = ray.p_origin + hit.distance * ray.d;
+  const auto line = lines_.colour_at(prototype_from_world_ * p,
+                                     prototype_from_world_.rotation * prototype_.face_normal(hit));
+  if (!line) return finish_sample(hit, ray, p_eye, light);
+  return {static_cast<int>(parts_.size()), line->reverse().cast<float>()};
+}
+
 ReferenceRenderer::Sample ReferenceRenderer::light_along(const Ray& ray) const {
   const Hit hit = prototype_.first_hit(ray);
   if (hit.object < 0) return {};
@@ -326,15 +346,15 @@ ReferenceRenderer::Sample ReferenceRenderer::light_along(const Ray& ray) const {
   const Sample view = view_sample(p, n_face);
   if (view.part >= 0) return view;
   const Sample on_surface = surface_sample(p, turned_against(prototype_.shading_normal(hit), -n_face));
-  return on_surface.part >= 0 ? on_surface : finish_sample(hit, ray, p_viewer_, light_);
+  return on_surface.part >= 0 ? on_surface : paint_sample(hit, ray, p_viewer_, light_);
 }
 
 ReferenceRenderer::Sample ReferenceRenderer::parts_along(const Ray& ray, const PartsLight& light) const {
   const Nearest nearest = nearest_part(ray);
-  if (nearest.part < 0 && finish_ == nullptr) return {};
+  if (nearest.part < 0 && finish_ == nullptr && lines_.is_empty()) return {};
   const Hit prototype = prototype_.first_hit(ray);
   if (nearest.part < 0 || is_hidden(nearest, ray, prototype))
-    return finish_sample(prototype, ray, ray.p_origin, light);
+    return paint_sample(prototype, ray, ray.p_origin, light);
   const Part& part = parts_[static_cast<std::size_t>(nearest.part)];
   if (part.on_surface && !nearest.p_cap)
     return {nearest.part, radiance_on_surface(nearest, part.rays.shading_normal(nearest.hit))};

@@ -9,6 +9,7 @@
 #include "scene/posed_scene.h"
 #include "sim/ray_scene.h"
 #include "sim/reference_brdf.h"
+#include "sim/reference_lines.h"
 #include "sim/world.h"
 
 namespace limn::sim {
@@ -40,11 +41,11 @@ class ReferenceRenderer {
 
   /// The light that projector `index` should give if it were the only one. For each point that a pixel
   /// lights: the colour of the view part that the viewer sees in front of it, else that of the surface part
-  /// within 2 mm of it, else that of the prototype's finish.
+  /// within 2 mm of it, else that of the prototype's line of light or finish.
   PartImage projector_image(std::size_t index) const;
 
-  /// The parts as an imager sees them, without those that the prototype hides, over the prototype's finish.
-  /// If no room light is known, the lamp moves with the imager.
+  /// The parts as an imager sees them, without those that the prototype hides, over the prototype's lines of
+  /// light and its finish. If no room light is known, the lamp moves with the imager.
   PartImage parts_image(const Imager& imager) const;
 
   DepthOrder depth_order(const Imager& imager) const;
@@ -58,6 +59,8 @@ class ReferenceRenderer {
     Pose part_from_world;
     bool is_cut;
     std::vector<bool> closed;  // for each triangle, whether its piece closes; only of a part that is cut
+    const scene::Volume* volume = nullptr;  // what its cap shows; null: none
+    scene::GreyWindow window = {};
   };
   struct Sample {
     int part = -1;
@@ -79,6 +82,10 @@ class ReferenceRenderer {
   Nearest first_of(std::size_t part, const Ray& ray) const;
   Hit first_kept(const Part& part, const Ray& ray, int* windings) const;
   Eigen::Vector3f cap_colour(const Part& part, const Eigen::Vector3d& p) const;
+  Sample paint_sample(const Hit& hit,
+                      const Ray& ray,
+                      const Eigen::Vector3d& p_eye,
+                      const PartsLight& light) const;
   static SurfaceMaterial material_at(const Part& part, const Hit& hit);
   Nearest nearest_part(const Ray& ray) const;
   bool is_hidden(const Nearest& nearest, const Ray& ray, const Hit& behind) const;
@@ -96,6 +103,7 @@ class ReferenceRenderer {
   std::vector<Part> parts_;
   const scene::Finish* finish_ = nullptr;  // null: none
   std::optional<scene::CutPlane> cut_;     // in the world
+  ReferenceLines lines_;
   Pose prototype_from_world_;
   Eigen::Vector3d p_viewer_;
   PartsLight light_;

@@ -61,7 +61,7 @@ void add_live(CLI::App& app, Run& run) {
       "what the screen\n"
       "shows, r release, a pair with the marker that glows, v switch between this look and the one before, x "
       "show both\n"
-      "looks side by side, g grid, escape asks to end.\n"
+      "looks side by side, g grid, d deviation from the CAD, escape asks to end.\n"
       "Example: limn live --seconds 5 --out session\n"
       "Example: limn live --devices devices.json --rig rig --scene config/scenes/door --out session "
       "--window\n"

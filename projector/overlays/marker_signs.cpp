@@ -52,9 +52,18 @@ void draw_ring(const Imager& projector,
       outline.emplace_back(cvRound(px->x * (1 << k_shift)), cvRound(px->y * (1 << k_shift)));
     }
   }
-  cv::Mat light(image->size(), image->type(), cv::Scalar::all(0));
+  // Only the ring's own box is drawn: there may be many rings.
+  const cv::Rect whole = cv::boundingRect(outline);
+  const int margin = 2;
+  const cv::Point corner((whole.x >> k_shift) - margin, (whole.y >> k_shift) - margin);
+  const cv::Size size((whole.width >> k_shift) + 2 * margin + 2, (whole.height >> k_shift) + 2 * margin + 2);
+  const cv::Rect box = cv::Rect(corner, size) & cv::Rect({}, image->size());
+  if (box.empty()) return;
+  for (cv::Point& p : outline) p -= box.tl() * (1 << k_shift);
+  cv::Mat light(box.size(), image->type(), cv::Scalar::all(0));
   cv::fillPoly(light, std::vector<std::vector<cv::Point>>{outline}, colour * strength, cv::LINE_AA, k_shift);
-  add(light, image);
+  cv::Mat place = (*image)(box);
+  add(light, &place);
 }
 
 void draw_word(const Imager& projector,

@@ -100,6 +100,22 @@ class Reader {
     return out;
   }
 
+  // A list of 1 to `most` pairs of numbers of at most `largest` in magnitude.
+  std::vector<Eigen::Vector2d> pairs(const char* key, std::size_t most, double largest) {
+    std::vector<Eigen::Vector2d> out;
+    const json* value = member(key, false);
+    if (!value) return out;
+    const auto is_pair = [&](const json& each) {
+      return each.is_array() && each.size() == 2 && each[0].is_number() && each[1].is_number() &&
+             std::abs(each[0].get<double>()) <= largest && std::abs(each[1].get<double>()) <= largest;
+    };
+    if (!value->is_array() || value->empty() || value->size() > most ||
+        !std::all_of(value->begin(), value->end(), is_pair))
+      return problem(key, fmt::format("a list of 1 to {} pairs of numbers", most), found_in(*value)), out;
+    for (const json& each : *value) out.emplace_back(each[0].get<double>(), each[1].get<double>());
+    return out;
+  }
+
   void problem(const std::string& key, const std::string& expected, const std::string& found) {
     if (!problem_) problem_ = error("{}: expected {}, found {}.", key, expected, found);
   }
@@ -166,6 +182,21 @@ Message read_message(const std::string& type, Reader* reader) {
     const std::uint64_t id = reader->number("id", k_max_id);
     return CommentMessage{id, read_comment(reader)};
   }
+  if (type == "stroke") {
+    constexpr double k_farthest_px = 20000;
+    StrokeMessage stroke;
+    stroke.id = reader->number("id", k_max_id);
+    const std::string what = reader->text("what", k_longest_word, false);
+    const std::string from = reader->text("from", k_longest_word, false);
+    if (what != "draw" && what != "move") reader->problem("what", "draw or move", in_quotes(what));
+    if (from != "room" && from != "window") reader->problem("from", "room or window", in_quotes(from));
+    stroke.moves = what == "move";
+    stroke.in_window = from == "window";
+    stroke.line = reader->text("line", scene::k_longest_line_name, false);
+    stroke.image = static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu));
+    stroke.px = reader->pairs("px", k_most_stroke_px, k_farthest_px);
+    return stroke;
+  }
   if (type == "pictures") return ImagesMessage{reader->boolean("room")};
   if (type == "seen")
     return ImageShownMessage{static_cast<std::uint32_t>(reader->number("picture", 0xffffffffu))};
@@ -205,7 +236,8 @@ Message read_message(const std::string& type, Reader* reader) {
     return GlassesStateMessage{is == "asleep"};
   }
   reader->problem(
-      "type", "edit, comment, pictures, seen, window, glasses, glasses_pose, glasses_view or glasses_state",
+      "type",
+      "edit, comment, stroke, pictures, seen, window, glasses, glasses_pose, glasses_view or glasses_state",
       in_quotes(type));
   return {};
 }

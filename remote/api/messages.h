@@ -19,6 +19,8 @@ namespace limn::remote {
 
 /// The longest texts that are accepted, bytes. (A comment may have scene::k_longest_comment.)
 constexpr std::size_t k_longest_message = 16 * 1024, k_longest_word = 200, k_longest_guest_name = 64;
+/// Points of one stroke message.
+constexpr std::size_t k_most_stroke_px = 300;
 /// The longest frame of a window: its number and a JPEG.
 constexpr std::size_t k_longest_jpeg = 4 * 1024 * 1024, k_longest_frame = 4 + k_longest_jpeg;
 
@@ -39,6 +41,16 @@ struct CommentMessage {
 /// `pictures`: begins or ends images of the room.
 struct ImagesMessage {
   bool room = false;
+};
+/// `stroke`: points in an image that was shown, through which a line is drawn on the prototype or moved on
+/// it.
+struct StrokeMessage {
+  std::uint64_t id = 0;     ///< As above.
+  bool moves = false;       ///< Moves the place of a line at the first point to the last one; else draws on.
+  std::string line;         ///< A drawn line; for one that does not exist yet, its name.
+  bool in_window = false;   ///< The image is one of the client's window; else of the room.
+  std::uint32_t image = 0;  ///< Its number.
+  std::vector<Eigen::Vector2d> px;  ///< Pixel (0, 0) is the first one's centre.
 };
 /// `seen`: the page has shown this image of the room.
 struct ImageShownMessage {
@@ -81,6 +93,7 @@ struct GlassesStateMessage {
 };
 using Message = std::variant<EditMessage,
                              CommentMessage,
+                             StrokeMessage,
                              ImagesMessage,
                              ImageShownMessage,
                              WindowMessage,

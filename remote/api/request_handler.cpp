@@ -3,9 +3,13 @@
 #include <nlohmann/json.hpp>
 
 #include "core/json_text.h"
+#include "exchange/curves/csv_curves.h"
+#include "exchange/curves/dxf_curves.h"
 #include "remote/api/responses.h"
 #include "remote/api/roles.h"
+#include "remote/api/stroke_edit.h"
 #include "remote/glasses/glasses_messages.h"
+#include "scene/drawn_lines.h"
 
 namespace limn::remote {
 namespace {
@@ -30,6 +34,8 @@ const std::vector<RequestHandler::Route>& RequestHandler::routes() {
       {"GET", "/api/actions", Role::look, &RequestHandler::get_actions},
       {"POST", "/api/edit", Role::look,
        &RequestHandler::post_edit},  // the action's own role is checked later
+      {"GET", "/api/lines.csv", Role::look, &RequestHandler::get_lines},
+      {"GET", "/api/lines.dxf", Role::look, &RequestHandler::get_lines},
       {"GET", "/picture/room.jpg", Role::look, &RequestHandler::get_room_image},
       {"GET", "/picture/projector/", Role::look, &RequestHandler::get_projector_image},
       {"GET", "/picture/look/", Role::look, &RequestHandler::get_look_image},
@@ -143,6 +149,21 @@ void RequestHandler::get_state(const AuthenticatedRequest&, ResponseCallback res
 
 void RequestHandler::get_actions(const AuthenticatedRequest&, ResponseCallback respond) {
   respond(json_response(actions_json()));
+}
+
+// The curves that are shown, in the prototype's frame, as a file.
+void RequestHandler::get_lines(const AuthenticatedRequest& request, ResponseCallback respond) {
+  const SessionUpdate* update = state_.update();
+  std::vector<exchange::NamedCurve> curves;
+  if (update && update->scene) curves = scene::shown_curves(*update->scene, update->posed);
+  if (curves.empty())
+    return respond(
+        error_response(k_http_not_found, "expected lines with curves that are shown, found none."));
+  if (request.path.ends_with(".dxf"))
+    return respond(
+        {200, "image/vnd.dxf", exchange::encode_dxf_curves(curves), {{"Cache-Control", "no-store"}}});
+  respond(
+      {200, "text/csv; charset=utf-8", exchange::encode_csv_curves(curves), {{"Cache-Control", "no-store"}}});
 }
 
 void RequestHandler::get_room_image(const AuthenticatedRequest& request, ResponseCallback respond) {
@@ -268,6 +289,19 @@ void RequestHandler::handle_message(const ClientPtr& client, const EditMessage& 
 void RequestHandler::handle_message(const ClientPtr& client, const CommentMessage& message) {
   const auto refusal = add_comment(client->guest, message.comment, answer_to(client, message.id));
   if (refusal) refuse_message(client, message.id, *refusal);
+}
+
+void RequestHandler::handle_message(const ClientPtr& client, const StrokeMessage& message) {
+  const Imager* camera = message.in_window ? client->window.shown.find(message.image)
+                                           : room_images_.shown_image(client->guest, message.image);
+  if (!camera)
+    return refuse_message(
+        client, message.id,
+        "picture: expected one that shows the prototype and was sent lately, found another.");
+  const auto edit = stroke_edit(message, *camera);
+  if (!edit) return refuse_message(client, message.id, edit.message());
+  if (const auto refusal = edits_.add(client->guest, *edit, answer_to(client, message.id)))
+    refuse_message(client, message.id, *refusal);
 }
 
 void RequestHandler::handle_message(const ClientPtr& client, const ImagesMessage& message) {

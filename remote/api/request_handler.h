@@ -89,6 +89,7 @@ class RequestHandler : public HttpHandler {
 
   void get_state(const AuthenticatedRequest& request, ResponseCallback respond);
   void get_actions(const AuthenticatedRequest& request, ResponseCallback respond);
+  void get_lines(const AuthenticatedRequest& request, ResponseCallback respond);
   void get_room_image(const AuthenticatedRequest& request, ResponseCallback respond);
   void get_projector_image(const AuthenticatedRequest& request, ResponseCallback respond);
   void get_look_image(const AuthenticatedRequest& request, ResponseCallback respond);
@@ -108,6 +109,7 @@ class RequestHandler : public HttpHandler {
 
   void handle_message(const ClientPtr& client, const EditMessage& message);
   void handle_message(const ClientPtr& client, const CommentMessage& message);
+  void handle_message(const ClientPtr& client, const StrokeMessage& message);
   void handle_message(const ClientPtr& client, const ImagesMessage& message);
   void handle_message(const ClientPtr& client, const ImageShownMessage& message);
   void handle_message(const ClientPtr& client, const WindowMessage& message);

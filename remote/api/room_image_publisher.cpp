@@ -76,6 +76,7 @@ void RoomImagePublisher::receive_image(CompositeImage image) {
   if (!message_ || image.jpeg != image_.jpeg || image.json != image_.json) {
     message_ = std::make_shared<const std::string>(
         image_message(ImageKind::room, ++number_, image.json, image.jpeg));
+    shown_.add(number_, image.over_prototype);
     image_ = std::move(image);
     image_role_ = drawing_since_ < hidden_.second ? hidden_.first : Role::look;
   }

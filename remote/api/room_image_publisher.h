@@ -8,6 +8,7 @@
 
 #include "core/result.h"
 #include "remote/api/auth_sessions.h"
+#include "remote/api/shown_images.h"
 #include "remote/api/ws_client.h"
 #include "remote/http/http.h"
 #include "remote/http/http_handler.h"
@@ -45,6 +46,11 @@ class RoomImagePublisher {
   /// Sends the last image to clients that do not have it, and has another one drawn if it is time.
   void update_at(Clock::time_point now);
 
+  /// The camera of an image of the room, in the prototype's frame, if the guest may see the room; else null.
+  const Imager* shown_image(const AuthSessions::Guest& guest, std::uint32_t image) const {
+    return may_see_room(guest) ? shown_.find(image) : nullptr;
+  }
+
   /// Until then, only guests of this role or a higher one see images of the room.
   void hide(Role role, Clock::time_point until);
 
@@ -62,6 +68,7 @@ class RoomImagePublisher {
   Clock::time_point drawing_since_, image_came_at_, next_image_at_;
   CompositeImage image_;                        // the last one
   std::uint32_t number_ = 0;                    // its number
+  ShownImages shown_;                           // by their numbers
   std::shared_ptr<const std::string> message_;  // its message
   Role image_role_ = Role::look;  // the least role that may see it, even when the room is shown again
   std::pair<Role, Clock::time_point> hidden_{Role::look, Clock::time_point::min()};

@@ -78,6 +78,38 @@ nlohmann::ordered_json to_json(const SessionState::Slot& slot) {
   return out;
 }
 
+SessionState::Deviation deviation_state(const session::Session& session) {
+  const session::DeviationStatus& status = session.deviation();
+  const scene::DeviationChoice& choice = session.show_state().deviation;
+  SessionState::Deviation out{.progress = status.progress,
+                              .text = status.text,
+                              .report = status.report.string(),
+                              .is_shown = choice.is_shown,
+                              .is_held = choice.is_held,
+                              .is_fitted = choice.fit_box.has_value(),
+                              .tolerance_mm = 1e3 * choice.tolerance_m,
+                              .extremes = {}};
+  if (choice.layer) out.extremes = choice.layer->marks;
+  return out;
+}
+
+nlohmann::ordered_json to_json(const SessionState::Deviation& deviation) {
+  nlohmann::ordered_json out = {{"progress", deviation.progress},
+                                {"text", deviation.text},
+                                {"report", deviation.report},
+                                {"is_shown", deviation.is_shown},
+                                {"is_held", deviation.is_held},
+                                {"is_fitted", deviation.is_fitted},
+                                {"tolerance_mm", rounded(deviation.tolerance_mm)}};
+  out["extremes"] = nlohmann::ordered_json::array();
+  for (const scene::DeviationLayer::Mark& mark : deviation.extremes) {
+    const Eigen::Vector3d mm = 1e3 * mark.p_prototype;
+    out["extremes"].push_back({{"mm", rounded(1e3 * mark.distance_m)},
+                               {"at_mm", {rounded(mm.x()), rounded(mm.y()), rounded(mm.z())}}});
+  }
+  return out;
+}
+
 }  // namespace
 
 SessionState session_state(const session::Session& session,
@@ -104,10 +136,17 @@ SessionState session_state(const session::Session& session,
   out.finishes = scene::finish_names(scene);
   out.finish = show_state.finish;
   if (scene.section) out.section = show_state.section;
+  for (const scene::Line& line : scene.lines) out.lines.push_back(line.name);
+  for (const scene::DrawnLine& line : show_state.drawn) {
+    out.lines.push_back(line.name);
+    out.lines_drawn.push_back(line.name);
+  }
+  out.lines_on = show_state.lines;
   out.light = light_text(scene, show_state);
   out.viewer = show_state.viewer;
   out.follows = session.composed().follows;
   out.repair = session.recalibration().progress;
+  out.deviation = deviation_state(session);
   out.pace = session.pace();
   out.windows = {session.windows().begin(), session.windows().end()};
   for (const Imager& projector : session.setup().rig.projectors) out.projectors.push_back(projector.name);
@@ -154,6 +193,9 @@ nlohmann::ordered_json to_json(const SessionState& state) {
     out["section"] = {{"is_on", state.section->is_on},
                       {"is_held", state.section->is_held},
                       {"is_flipped", state.section->is_flipped}};
+  out["lines"] = state.lines;
+  out["lines_on"] = state.lines_on;
+  out["lines_drawn"] = state.lines_drawn;
   out["light"] = state.light;
   out["screen"] = state.screen;
   out["screens"] = scene::screen_names();
@@ -164,6 +206,7 @@ nlohmann::ordered_json to_json(const SessionState& state) {
   out["viewer"] = state.viewer;
   out["follows"] = state.follows;
   out["repair"] = state.repair;
+  out["deviation"] = to_json(state.deviation);
   out["pace"] = state.pace;
   out["windows"] = state.windows;
   out["projectors"] = state.projectors;

@@ -46,6 +46,9 @@ struct SessionState {
   std::vector<std::string> finishes;           ///< Names of the scene's finishes.
   std::string finish;                          ///< The prototype's; empty: none.
   std::optional<scene::SectionState> section;  ///< Absent: the scene has none.
+  std::vector<std::string> lines;              ///< Names of the scene's lines of light and of drawn ones.
+  std::vector<std::string> lines_on;           ///< Those that are shown.
+  std::vector<std::string> lines_drawn;        ///< Those that were drawn.
   std::string light;   ///< In the words of its action; empty: the scene's; `other`: not expressible in them.
   std::string screen;  ///< What was last chosen for all screens.
   std::vector<scene::Output> outputs;
@@ -53,7 +56,17 @@ struct SessionState {
   std::string follows;  ///< The guest whose tablet is the viewpoint now; empty: none.
   std::vector<std::string> windows;  ///< Guests whose tablets can be the viewpoint.
   std::string repair;                ///< Progress of the recalibration; empty: none runs.
-  std::string pace;                  ///< What is left out to keep real time; empty: nothing.
+  /// The comparison of the prototype with its CAD.
+  struct Deviation {
+    std::string progress;  ///< Empty: none runs.
+    std::string text;      ///< The result in words; empty: there is none.
+    std::string report;    ///< The folder of the newest report; empty: none.
+    bool is_shown = false, is_held = false, is_fitted = false;
+    double tolerance_mm = 0;
+    std::vector<scene::DeviationLayer::Mark> extremes;
+  };
+  Deviation deviation;
+  std::string pace;  ///< What is left out to keep real time; empty: nothing.
   std::vector<std::string> projectors;
   std::vector<session::DeviceState> devices;
   std::vector<std::string> waiting;  ///< Loose markers that can be paired.

@@ -88,6 +88,7 @@ void TabletWindows::send_drawn_frame(const std::shared_ptr<WsClient>& client,
       tablets_[client->guest.name] = {client, now};
       set_viewpoint_(client->guest.name, image.p_viewpoint_world);
     }
+    window.shown.add(number, image.over_prototype);
     client->outbox.set_image(ImageKind::window, std::make_shared<const std::string>(image_message(
                                                     ImageKind::window, number, image.json, image.jpeg)));
     client->wake();

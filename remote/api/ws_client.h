@@ -11,6 +11,7 @@
 
 #include "remote/api/auth_sessions.h"
 #include "remote/api/messages.h"
+#include "remote/api/shown_images.h"
 #include "remote/glasses/glasses_registration.h"
 #include "remote/http/http_handler.h"
 
@@ -77,6 +78,7 @@ struct WsClient {
     std::optional<std::uint32_t> frame_in_flight;  ///< The frame that is being drawn into.
     std::chrono::steady_clock::time_point frame_since;
     std::optional<Frame> next_frame;  ///< The newest frame that came meanwhile.
+    ShownImages shown;                ///< By the frames' numbers.
 
     bool is_open() const { return !device.empty(); }
   };

@@ -76,6 +76,13 @@ bool is_in_image(const Imager& view, const scene::Scene& scene, const scene::Pos
   return px && view.contains(*px);
 }
 
+// The camera with the prototype's frame for its world.
+std::optional<Imager> over_prototype(Imager camera, const scene::PosedScene& posed) {
+  if (!posed.world_from_prototype) return std::nullopt;
+  camera.imager_from_world = camera.imager_from_world * *posed.world_from_prototype;
+  return camera;
+}
+
 CompositeImage no_image(const std::string& why) {
   return {json_text(nlohmann::json{{"sees", "nothing"}, {"why", why}, {"markers", 0}}), {}};
 }
@@ -360,6 +367,7 @@ CompositeImage TabletView::Impl::frame_with_parts(const WaitingFrame& frame,
   const Stamp encoding = std::chrono::steady_clock::now();
   const Pose view_from_world = observation.view->imager_from_world * turned_from_world;
   CompositeImage result{{}, device::encode_jpeg(out, k_quality), view_from_world.inverse().translation};
+  result.over_prototype = over_prototype(*observation.view, posed);
   const double encode_ms = milliseconds_since(encoding);
   const Lens& lens = observation.view->lens;
   result.json = json_text(nlohmann::json{
@@ -400,7 +408,10 @@ CompositeImage TabletView::Impl::room_with_parts(const SessionSnapshot& snapshot
   const scene::PosedScene posed = scene::compose_scene(*snapshot.scene, snapshot.show_state, tracks);
   const cv::Mat out =
       split_composite(camera, image, posed, tracks, snapshot, TabletViewMode::as_screen, &room);
-  return {json_text(nlohmann::json{{"why", ""}}), device::encode_jpeg(out, k_quality)};
+  return {json_text(nlohmann::json{{"why", ""}}),
+          device::encode_jpeg(out, k_quality),
+          {},
+          over_prototype(camera, posed)};
 }
 
 TabletView::TabletView(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}

@@ -20,6 +20,8 @@ struct CompositeImage {
   std::string json;                ///< The JSON that docs/remote.md describes for the image.
   std::vector<std::uint8_t> jpeg;  ///< Empty: no image.
   std::optional<Eigen::Vector3d> p_viewpoint_world = {};  ///< The tablet's camera; nullopt: not known.
+  /// The camera as it saw the prototype: its world is the prototype's frame. nullopt: not known.
+  std::optional<Imager> over_prototype = {};
 };
 using ImageCallback = std::function<void(CompositeImage)>;
 

@@ -15,6 +15,11 @@ const k_words = {
   "split_at": "split moved",
   "delete_look": "deleted look",
   "undelete_look": "brought the look back",
+  "draw_line": "drawn",
+  "erase_line": "removed",
+  "smooth_line": "smoothed",
+  "move_line": "moved",
+  "rename_line": "is now",
   "viewer": "view parts for"
 };
 
@@ -35,8 +40,9 @@ const label_of = (name) => k_words[name] ?? name.replaceAll("_", " ");
 // The value of an edit in words.
 function value_of(edit, state) {
   const takes = known.get(edit.action)?.takes;
+  if (edit.action === "line") return (state.lines_on ?? []).includes(edit.slot) ? "on" : "off";
   if (takes === "on_off") return state[edit.action === "freeze" ? "frozen" : edit.action] ? "on" : "off";
-  if (takes === "pose") return "";
+  if (takes === "pose" || edit.action === "draw_line" || edit.action === "move_line") return "";
   if (edit.action === "viewer") return edit.value || "the scene's own viewer";
   return edit.value && (takes === "millimetres" || takes === "number") ? `${edit.value} mm` : edit.value;
 }

@@ -2,8 +2,10 @@
 import { role_of } from "/actions.js";
 import { by_id, h, icon, keep, set_text } from "/dom.js";
 import { draw_picture, fetch_picture } from "/pictures.js";
+import { make_deviation } from "/deviation.js";
+import { make_pen } from "/pen.js";
 import { make_section } from "/section.js";
-import { make_finish, make_shading } from "/shading.js";
+import { make_finish, make_lines, make_shading } from "/shading.js";
 import { make_switch } from "/stage.js";
 
 const k_screens = {
@@ -179,7 +181,10 @@ export function make_light(session) {
   const outputs = h("div", { class: "stack" });
   const shading = make_shading(session),
     finish = make_finish(session),
-    section = make_section(session);
+    section = make_section(session),
+    lines = make_lines(session),
+    deviation = make_deviation(session),
+    pen = make_pen(session);
   const viewers = make_viewers(session);
   const projectors = make_projectors(session);
   by_id("light").append(
@@ -199,6 +204,9 @@ export function make_light(session) {
       ),
       section,
       finish,
+      lines,
+      pen,
+      deviation,
       shading,
     ),
     h("h3", {}, "Projectors"),
@@ -207,7 +215,8 @@ export function make_light(session) {
   return {
     opened: (name) => projectors.opened(name),
     show(state) {
-      for (const part of [grid, rings, split, viewers, section, finish, shading, projectors]) part.show(state);
+      for (const part of [grid, rings, split, viewers, section, finish, lines, pen, deviation, shading, projectors])
+        part.show(state);
       keep(
         screens,
         state.screens,

@@ -88,6 +88,11 @@ export class Link extends EventTarget {
     return this.#ask({ type: "edit", action, slot, value: String(value) });
   }
 
+  /** Draws on a line of light, or moves it, through an image (docs/remote.md). */
+  stroke(stroke) {
+    return this.#ask({ type: "stroke", ...stroke });
+  }
+
   comment(look, slot, text) {
     return this.#ask({ type: "comment", look, slot, text });
   }

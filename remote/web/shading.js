@@ -1,5 +1,5 @@
-// Material of parts, window of volumes, finish of the prototype, and room light: sliders that act when they are released.
-import { h } from "/dom.js";
+// Material of parts, window of volumes, finish and lines of the prototype, and room light: sliders that act when they are released.
+import { h, keep } from "/dom.js";
 
 function slider(label, properties) {
   const input = h("input", { type: "range", ...properties, "aria-label": label });
@@ -88,6 +88,25 @@ export function make_finish(session) {
     if (names.join("\n") !== [...choice.options].map(({ value }) => value).join("\n"))
       choice.replaceChildren(...names.map((name) => h("option", { value: name }, name || "Bare prototype")));
     if (choice.value !== finish) choice.value = finish;
+  };
+  return node;
+}
+
+/** A switch for each line of light on the prototype. */
+export function make_lines(session) {
+  const list = h("div", { class: "choices wrap" });
+  const node = h("div", { class: "stack", "data-needs": "work", hidden: true }, h("h3", {}, "Lines"), list);
+  const is_on = (name) => (session.state?.lines_on ?? []).includes(name);
+  node.show = ({ lines = [], lines_on = [] }) => {
+    node.hidden = lines.length === 0;
+    keep(
+      list,
+      lines,
+      (name) => name,
+      (name) =>
+        session.button("line", { slot: name, value: () => (is_on(name) ? "off" : "on"), "data-line": name }, name),
+    );
+    for (const button of list.children) button.setAttribute("aria-pressed", String(lines_on.includes(button.key)));
   };
   return node;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "core/marker.h"
 #include "core/track.h"
 #include "projector/overlays/overlays.h"
+#include "scene/deviation_layer.h"
 #include "scene/posed_scene.h"
 
 namespace limn::session {
@@ -39,7 +41,9 @@ struct FrameDescription {
   std::vector<projector::Overlay> on_surface = {};  ///< under the light that markers get
   std::vector<projector::Overlay> signs = {};       ///< over it
   std::vector<MarkerName> loose = {};               ///< loose markers, which get no light either
-  bool is_black = false;                            ///< no light at all
+  /// What PosedScene::deviation names; null: nothing.
+  std::shared_ptr<const scene::DeviationLayer> deviation = {};
+  bool is_black = false;  ///< no light at all
   /// Whether the images differ from those before; they are then drawn with fewer samples
   /// (Renderer::set_quick_motion).
   bool is_moving = false;

@@ -66,6 +66,7 @@ FrameDrawer::FrameDrawer(const scene::Scene* scene,
 // Draws: parts, overlays on the surface, no light on markers, signs beside markers.
 EyeImages FrameDrawer::image(const FrameDescription& frame, std::size_t projector) {
   apply_arriving_light(frame.arriving);
+  use_deviation(frame.deviation);
   renderer_.set_quick_motion(frame.is_moving);
   const std::string& name = rig_->projectors[projector].name;
   if (std::ranges::count(options_.stereo_projectors, name) == 0)
@@ -81,6 +82,12 @@ void FrameDrawer::apply_arriving_light(const std::vector<cv::Mat>& maps) {
     arriving_[i] = map.clone();
     renderer_.set_occlusion(i, map);
   }
+}
+
+void FrameDrawer::use_deviation(const std::shared_ptr<const scene::DeviationLayer>& layer) {
+  if (!layer || layer == deviation_) return;
+  deviation_ = layer;
+  renderer_.set_deviation(*layer);
 }
 
 cv::Mat FrameDrawer::drawn(const FrameDescription& frame, std::size_t projector, const Imager& eye) {

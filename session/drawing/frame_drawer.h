@@ -38,6 +38,9 @@ class FrameDrawer {
   /// Where a projector's light falls on markers and balls of the scene, CV_8UC1 (tracker::marker_mask).
   cv::Mat carrier_mask(std::size_t projector, std::span<const Track> tracks) const;
 
+  /// Uploads the deviation that frames show from now on, if it is another one; null: nothing changes.
+  void use_deviation(const std::shared_ptr<const scene::DeviationLayer>& layer);
+
   projector::Renderer& renderer() { return renderer_; }
   const std::vector<Body>& bodies() const { return bodies_; }
   const std::vector<Constellation>& constellations() const { return constellations_; }
@@ -59,8 +62,9 @@ class FrameDrawer {
   projector::Renderer renderer_;
   std::vector<Body> bodies_;
   std::vector<Constellation> constellations_;
-  bool has_infrared_ = false;      // whether a camera sees no projected light
-  std::vector<cv::Mat> arriving_;  // the maps that the renderer has
+  bool has_infrared_ = false;                               // whether a camera sees no projected light
+  std::vector<cv::Mat> arriving_;                           // the maps that the renderer has
+  std::shared_ptr<const scene::DeviationLayer> deviation_;  // the layer that it has; null: none
 };
 
 }  // namespace limn::session

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "apps/scan.h"
-#include "calib/surface/surface_samples.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/rig.h"
@@ -18,6 +17,7 @@
 #include "sim/truth.h"
 #include "sim/virtual_rig.h"
 #include "tests/calib/scanned_panel.h"
+#include "tests/support/bumped_door.h"
 #include "tests/support/matchers.h"
 #include "tests/support/meshes.h"
 #include "tests/support/text.h"
@@ -31,68 +31,12 @@ namespace {
 namespace fs = std::filesystem;
 using calib::DeviationState;
 using Eigen::Vector3d;
+using test::box_object;
+using test::bumped;
+using test::door_height;
 
 const fs::path k_plan = test::config_folder() / "plans/bench.json",
                k_door = test::config_folder() / "scenes/door/door.glb";
-
-// Clay that was added to the door's outer side or taken from it (m, the door's frame).
-struct DoorBump {
-  double x = 0, y = 0, radius = 0, height = 0;
-};
-constexpr DoorBump k_door_bumps[] = {{-0.20, -0.09, 0.030, 0.3e-3},  {-0.11, 0.03, 0.030, 1e-3},
-                                     {0.12, -0.09, 0.035, 3e-3},     {0.20, -0.05, 0.025, -0.6e-3},
-                                     {-0.05, -0.12, 0.030, -1.5e-3}, {0.05, 0.00, 0.035, -3e-3}};
-
-double door_height(const Vector3d& p) {
-  double sum = 0;
-  for (const DoorBump& b : k_door_bumps) {
-    const double share = 1 - (Eigen::Vector2d(b.x, b.y) - p.head<2>()).squaredNorm() / (b.radius * b.radius);
-    if (share > 0) sum += b.height * share * share;
-  }
-  return sum;
-}
-
-// The door with its bumps, finely divided, so that it has their shape.
-scene::Mesh bumped(const scene::Mesh& door) {
-  scene::Mesh mesh = door;
-  const scene::ScanSurface fine = calib::surface_samples(door, 2.5e-3, 2'000'000).surface;
-  mesh.positions = fine.positions;
-  mesh.triangles = fine.triangles;
-  mesh.uvs.clear();
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  for (std::size_t i = 0; i < fine.positions.size(); ++i)
-    if (fine.normals[i].z() > 0.3f)
-      mesh.positions[i] +=
-          static_cast<float>(door_height(fine.positions[i].cast<double>())) * fine.normals[i];
-  scene::ScanSurface surface;
-  surface.positions = mesh.positions;
-  surface.triangles = mesh.triangles;
-  mesh.normals = scene::normals_from_triangles(surface);
-  return mesh;
-}
-
-// A hand: a palm 50 mm in front of the door and a finger that touches it, as boxes of a mesh (world frame).
-sim::Object box_object(const std::string& name, const Pose& world_from_box, const Vector3d& half) {
-  scene::Mesh mesh;
-  for (int axis = 0; axis < 3; ++axis)
-    for (const double side : {-1.0, 1.0}) {
-      const auto first = static_cast<std::uint32_t>(mesh.positions.size());
-      const Vector3d n = side * Vector3d::Unit(axis), u = Vector3d::Unit((axis + 1) % 3), v = n.cross(u);
-      for (const auto& [a, b] : {std::pair{-1, -1}, std::pair{1, -1}, std::pair{1, 1}, std::pair{-1, 1}}) {
-        mesh.positions.push_back((n + a * u + b * v).cwiseProduct(half).cast<float>());
-        mesh.normals.push_back(n.cast<float>());
-      }
-      mesh.triangles.push_back({first, first + 1, first + 2});
-      mesh.triangles.push_back({first, first + 2, first + 3});
-    }
-  mesh.triangle_materials.assign(mesh.triangles.size(), 0);
-  sim::Object object;
-  object.name = name;
-  object.mesh = std::make_shared<const scene::Mesh>(std::move(mesh));
-  object.world_from_object = world_from_box;
-  object.albedo = {0.35, 0.45, 0.6};
-  return object;
-}
 
 // The virtual rig scans the door with bumps, dents and a hand on it, once.
 class DoorDeviation : public testing::Test {

@@ -25,8 +25,8 @@ using Names = std::set<std::string>;
 // Each room and the rooms that it may include. Folders with a library of their own (exchange/poses) count as
 // rooms.
 const std::map<std::string, Names>& allowed() {
-  static const Names k_libraries = {"core",  "scene",   "scene/meshes", "scene/volumes", "device",
-                                    "calib", "tracker", "projector",    "sim"};
+  static const Names k_libraries = {
+      "core", "scene", "scene/meshes", "scene/volumes", "device", "calib", "tracker", "projector", "sim"};
   static const auto with = [](const Names& more) {
     Names all = k_libraries;
     all.insert(more.begin(), more.end());
@@ -37,7 +37,8 @@ const std::map<std::string, Names>& allowed() {
       {"scene/files", {"core"}},
       {"scene/meshes", {"core", "scene/files"}},
       {"scene/volumes", {"core"}},
-      {"scene", {"core", "scene/files", "scene/meshes", "scene/volumes"}},
+      {"scene", {"core", "scene/files", "scene/meshes", "scene/volumes", "scene/lines"}},
+      {"scene/lines", {"core", "scene/files", "scene/meshes", "exchange/curves"}},
       {"device", {"core"}},
       {"calib", {"core", "scene", "scene/meshes"}},
       {"tracker", {"core"}},
@@ -52,10 +53,13 @@ const std::map<std::string, Names>& allowed() {
       {"wizard/design", {"core", "calib", "tracker"}},
       {"wizard/measure", {"core", "scene", "scene/meshes", "calib", "tracker"}},
       {"wizard", with({"device/gui", "wizard/measure"})},
+      {"session/deviation",
+       {"core", "scene", "scene/meshes", "calib", "projector", "wizard", "wizard/measure"}},
       {"session/drawing", {"core", "scene", "scene/meshes", "tracker", "projector"}},
       {"session/requests", {"core", "scene", "scene/meshes", "sim", "exchange/poses"}},
-      {"session", with({"device/gui", "exchange/poses", "wizard", "session/drawing", "session/requests"})},
-      {"remote", with({"device/gui", "session", "session/drawing", "session/requests"})},
+      {"session", with({"device/gui", "exchange/poses", "wizard", "wizard/measure", "session/deviation",
+                        "session/drawing", "session/requests"})},
+      {"remote", with({"exchange/curves", "device/gui", "session", "session/drawing", "session/requests"})},
       {"nodes", with({"device/gui", "exchange/poses", "wizard", "session", "session/drawing",
                       "session/requests", "remote"})},
       {"validate", with({"wizard", "wizard/measure", "session", "session/drawing", "session/requests"})},

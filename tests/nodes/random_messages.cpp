@@ -73,8 +73,17 @@ void fields(F& f, scene::CutPlane& x) {
   f.direction(x.normal), f(x.offset_m);
 }
 template <class F>
+void fields(F& f, scene::SurfacePoint& x) {
+  f(x.p), f(x.d_normal);
+}
+template <class F>
+void fields(F& f, scene::DrawnLine& x) {
+  f(x.name), f(x.style.colour), f(x.style.width_m), f(x.curve.is_closed), f(x.curve.points);
+}
+template <class F>
 void fields(F& f, scene::PosedScene& x) {
-  f(x.world_from_prototype), f(x.parts), f(x.viewpoints), f(x.light), f(x.finish), f(x.cut);
+  f(x.world_from_prototype), f(x.parts), f(x.viewpoints), f(x.light), f(x.finish), f(x.cut), f(x.lines),
+      f(x.drawn), f(x.deviation.layer), f(x.deviation.tolerance_m);
 }
 template <class F>
 void fields(F& f, session::FadingPart& x) {

@@ -93,8 +93,8 @@ TEST(RemoteMessages, AreThoseOfTheDocumentation) {
     EXPECT_TRUE(message) << text << ": " << (message ? "" : message.message());
     types.insert(json::parse(text)["type"].get<std::string>());
   }
-  EXPECT_EQ(types, (std::set<std::string>{"edit", "comment", "pictures", "seen", "window", "glasses",
-                                          "glasses_pose", "glasses_view", "glasses_state"}));
+  EXPECT_EQ(types, (std::set<std::string>{"edit", "comment", "stroke", "pictures", "seen", "window",
+                                          "glasses", "glasses_pose", "glasses_view", "glasses_state"}));
 }
 
 TEST(RemoteMessages, EveryActionIsAMessage) {

@@ -227,11 +227,11 @@ TEST_F(AServedSession, TellsTheStateOfTheDocumentation) {
   };
   check(state);
   check(state["slots"][0]);
-  for (const char* key :
-       {"number",   "slots",   "prototype", "looks",         "look",    "other_look", "deleted_look",
-        "blackout", "frozen",  "grid",      "marker_states", "split",   "outputs",    "light",
-        "split_mm", "screen",  "viewer",    "follows",       "windows", "screens",    "projectors",
-        "devices",  "waiting", "guests",    "comments",      "notes",   "repair",     "pace"})
+  for (const char* key : {"number",       "slots",    "prototype",  "looks",   "look",          "other_look",
+                          "deleted_look", "blackout", "frozen",     "grid",    "marker_states", "split",
+                          "outputs",      "light",    "split_mm",   "screen",  "viewer",        "follows",
+                          "windows",      "screens",  "projectors", "devices", "waiting",       "guests",
+                          "comments",     "notes",    "repair",     "pace",    "deviation"})
     EXPECT_TRUE(state.contains(key)) << key;
 }
 

@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "core/names.h"
+
 namespace limn::scene {
 namespace {
 
@@ -15,6 +17,8 @@ constexpr double k_exact = 1e-12;
 Scene a_scene() {
   Scene scene;
   scene.prototype = Prototype{};
+  scene.prototype->mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  scene.prototype->mesh.triangles = {{0, 1, 2}};
   for (const char* name : {"mirror", "trim"}) {
     Slot slot;
     slot.name = name;
@@ -26,7 +30,17 @@ Scene a_scene() {
   scene.finishes.emplace_back();
   scene.finishes[0].name = "sand";
   scene.section = Section{.marker = {"aruco_4x4_50", "8"}, .size_m = 0.04, .slots = {"mirror"}};
+  scene.lines.emplace_back();
+  scene.lines[0].name = "every 50";
+  scene.lines[0].is_shown = false;
   scene.slots[0].variants[0].volume = std::make_shared<Volume>();
+  Mesh& mesh = scene.prototype->mesh;
+  for (const auto& [x, y] : {std::pair(-1.0F, -1.0F), {1.0F, -1.0F}, {0.0F, 1.0F}}) {
+    mesh.positions.emplace_back(x, y, 0.0F);
+    mesh.normals.emplace_back(0.0F, 0.0F, 1.0F);
+  }
+  mesh.triangles = {{0, 1, 2}};
+  scene.drape = std::make_shared<const Drape>(mesh);
   scene.slots[0].variants.push_back({"new one", {}, Variant::AutoImported{LengthUnit::metre}});
   return scene;
 }
@@ -46,6 +60,8 @@ ShowState a_staging(const Scene& scene) {
   show_state.deleted_look = look_of("gone", "a");
   show_state.slots[0].variant = "b";
   show_state.screens = {{"wall"}, {"desk"}};
+  const Eigen::Vector3d d(0, 0, 1);
+  show_state.drawn = {{"stroke", {}, {{{{0, 0, 0}, d}, {{0.05, 0, 0}, d}, {{0.1, 0, 0}, d}}, false}}};
   return show_state;
 }
 
@@ -55,11 +71,21 @@ std::string text_of(const Pose& pose) {
   return fmt::format("{} {} {} {} {} {} {}", t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z());
 }
 
+std::string drawn_text(const std::vector<DrawnLine>& drawn) {
+  std::string text;
+  for (const DrawnLine& line : drawn) {
+    text += line.name + ": ";
+    for (const SurfacePoint& point : line.curve.points)
+      text += text_of(Pose(Eigen::Quaterniond::Identity(), point.p));
+  }
+  return text;
+}
+
 // All members of a show state, as text. A new member causes a compiler error until it is added here, too.
 std::map<std::string, std::string> members_of(const ShowState& show_state) {
   const auto& [slots, looks, look, other_look, deleted_look, blackout, frozen, marker_states, grid, split,
-               split_mm, screen, screens, light, finish, section, d_up_world, d_front_world, viewer] =
-      show_state;
+               split_mm, screen, screens, light, finish, section, lines, drawn, deviation, d_up_world,
+               d_front_world, viewer] = show_state;
   std::map<std::string, std::string> all = {
       {"look", look},
       {"other_look", other_look},
@@ -76,7 +102,14 @@ std::map<std::string, std::string> members_of(const ShowState& show_state) {
       {"d_front_world", text_of(Pose(Eigen::Quaterniond::Identity(), d_front_world))},
       {"finish", finish},
       {"section", fmt::format("{} {} {} {}", section.is_on, section.is_held, section.is_flipped,
-                              look_json({.name = "", .cut = section.plane}))},
+                              look_json({.name = "", .parts = {}, .cut = section.plane}))},
+      {"lines", joined_names(lines)},
+      {"deviation",
+       fmt::format(
+           "{} {} {} {} {}", deviation.layer != nullptr, deviation.is_shown, deviation.is_held,
+           deviation.fit_box ? text_of(Pose(Eigen::Quaterniond::Identity(), deviation.fit_box->max())) : "",
+           deviation.tolerance_m)},
+      {"drawn", drawn_text(drawn)},
       {"viewer", viewer}};
   for (const Look& each : looks) all["looks"] += look_json(each);
   for (const Output& each : screens)
@@ -174,6 +207,35 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
       return Case{usual, "hold", {"section"}, [](const ShowState& s) {
                     return s.section.is_on && s.section.is_held;
                   }};
+    case ActionId::line:
+      return Case{usual, "on", {"lines"}, [](const ShowState& s) { return s.lines.size() == 1; }, "every 50"};
+    case ActionId::draw_line:
+      return Case{usual,
+                  "points 0 0 0 10 0 0",
+                  {"lines", "drawn"},
+                  [](const ShowState& s) { return s.drawn.size() == 2 && s.drawn[1].name == "edge"; },
+                  "edge"};
+    case ActionId::erase_line:
+      return Case{usual, "", {"drawn"}, [](const ShowState& s) { return s.drawn.empty(); }, ""};
+    case ActionId::smooth_line:
+      return Case{usual,
+                  "",
+                  {"drawn"},
+                  [](const ShowState& s) {
+                    const auto& points = s.drawn[0].curve.points;
+                    return points.front().p.norm() < 1e-6 &&
+                           (points.back().p - Eigen::Vector3d(0.1, 0, 0)).norm() < 1e-6;
+                  },
+                  "stroke"};
+    case ActionId::move_line:
+      return Case{usual,
+                  "points 0 0 0 0 10 0",
+                  {"drawn"},
+                  [](const ShowState& s) { return s.drawn[0].curve.points.front().p.y() > 0.009; },
+                  "stroke"};
+    case ActionId::rename_line:
+      return Case{
+          usual, "edge", {"drawn"}, [](const ShowState& s) { return s.drawn[0].name == "edge"; }, "stroke"};
     case ActionId::save_look:
       return Case{usual, "new", {"looks", "look", "other_look"}, [](const ShowState& s) {
                     return s.looks.size() == 4 && s.looks[3].name == "new" && s.look == "new" &&
@@ -215,6 +277,10 @@ std::optional<Case> case_of(ActionId id, const Scene& scene) {
                   }};
     case ActionId::repair:  // done by the session's devices (live_test, live_devices_test)
       return Case{usual, "", {}, [](const ShowState&) { return true; }};
+    case ActionId::deviation:  // scanned and compared by the session (deviation_test)
+      return Case{usual, "tolerance 0.3", {"deviation"}, [](const ShowState& s) {
+                    return s.deviation.tolerance_m == 0.3e-3;
+                  }};
     case ActionId::light:
       return Case{usual, "30 45 0.6 0.3 0.1", {"light"}, [](const ShowState& s) {
                     return s.light->above_rgb == Eigen::Vector3d::Constant(0.3);
@@ -275,6 +341,45 @@ TEST(Actions, WhatTheSessionDoesIsReadAndRefusedInTime) {
   ShowState dark = a_staging(scene);
   dark.blackout = true;
   EXPECT_FALSE(apply_edit(scene, dark, {}, make_edit(ActionId::repair)));
+}
+
+TEST(Actions, ADeviationNeedsACadLightAndAResult) {
+  Scene scene = a_scene();
+  ShowState show_state = a_staging(scene);
+  const auto apply = [&](const std::string& value) {
+    auto after = apply_edit(scene, show_state, {}, make_edit(ActionId::deviation, "", value));
+    if (after) show_state = *after;
+    return after ? std::string() : after.message();
+  };
+  EXPECT_EQ(apply(""), "");
+  EXPECT_EQ(apply("toggle"), "") << "it scans";
+  EXPECT_FALSE(show_state.deviation.is_shown);
+  for (const char* needs : {"on", "hold on", "report"})
+    EXPECT_NE(apply(needs).find("expected a result, found none"), std::string::npos) << needs;
+  for (const char* bad : {"maybe", "hold", "fit", "fit 1 2 3", "fit 0 0 0 0 1 1", "fit 0 0 0 1e9 1 1",
+                          "tolerance", "tolerance 0", "tolerance 1 2", "tolerance nan", "on off"})
+    EXPECT_NE(apply(bad).find("deviation"), std::string::npos) << bad;
+  DeviationLayer layer;
+  layer.number = 1;
+  show_state.deviation.layer = std::make_shared<const DeviationLayer>(layer);
+  EXPECT_EQ(apply("toggle"), "");
+  EXPECT_TRUE(show_state.deviation.is_shown);
+  EXPECT_EQ(compose_scene(scene, show_state, {}).deviation, (PaintedDeviation{1, 0.5e-3}));
+  EXPECT_EQ(apply("hold on"), "");
+  EXPECT_TRUE(show_state.deviation.is_held);
+  EXPECT_EQ(apply("fit 10,20,30,-10,0,0"), "");
+  ASSERT_TRUE(show_state.deviation.fit_box);
+  EXPECT_TRUE(show_state.deviation.fit_box->min().isApprox(Eigen::Vector3d(-0.01, 0, 0), k_exact));
+  EXPECT_EQ(apply("fit off"), "");
+  EXPECT_FALSE(show_state.deviation.fit_box);
+  EXPECT_EQ(apply("off"), "");
+  EXPECT_EQ(compose_scene(scene, show_state, {}).deviation, PaintedDeviation());
+  show_state.blackout = true;
+  EXPECT_NE(apply("scan").find("blackout"), std::string::npos);
+  scene.prototype->mesh.triangles.clear();
+  EXPECT_NE(apply("off").find("expected a prototype with a CAD mesh"), std::string::npos);
+  scene.prototype.reset();
+  EXPECT_NE(apply("scan").find("expected a prototype with a CAD mesh"), std::string::npos);
 }
 
 TEST(Actions, AreFoundByTheirNames) {

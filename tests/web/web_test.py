@@ -332,6 +332,24 @@ class Checks:
         expect(shown == ["Repair: 12 of 44 patterns", True], "how far it is, and nothing to press", shown)
 
     @check
+    def how_far_the_prototype_is_from_its_cad_is_shown(self):
+        shown = self.browser.script_async("""
+            const state = await (await fetch("/api/state")).json();
+            const send = (deviation) => {
+              const data = JSON.stringify({ ...state, type: "state", deviation: { ...state.deviation, ...deviation } });
+              limn_test.sockets.at(-1).dispatchEvent(new MessageEvent("message", { data }));
+            };
+            const [scan, show] = document.querySelectorAll("[data-action=deviation]");
+            const before = [scan.disabled, show.disabled];
+            send({ progress: "12 of 44 patterns" });
+            const during = [scan.textContent.trim(), scan.disabled];
+            send({ text: "98 % within 0.5 mm", is_shown: true, extremes: [{ mm: 2.9, at_mm: [120, 40, -15] }] });
+            const extremes = scan.parentElement.querySelector("ul").textContent;
+            return [before, during, [show.disabled, show.getAttribute("aria-pressed")], extremes];""")
+        expect(shown == [[False, True], ["Scan: 12 of 44 patterns", True], [False, "true"], "+2.90 mmat 120, 40, -15 mm"],
+               "the progress, then the result and its extremes", shown)
+
+    @check
     def a_part_is_placed_by_numbers(self):
         before = self.mirror()["prototype_from_part"]
         wanted = [round(1000 * v + 4, 1) for v in before["translation_m"]]
