@@ -126,7 +126,8 @@ TEST(RemoteMessages, RefuseWithAReason) {
   has("{}", "type: expected it, found no such key");
   has(R"({"type": 3})", "type: expected text, found '3'");
   has(R"({"type": "dance"})",
-      "type: expected edit, comment, pictures, seen, window, glasses, glasses_pose, glasses_view or "
+      "type: expected edit, comment, stroke, pictures, seen, window, glasses, glasses_pose, glasses_view "
+      "or "
       "glasses_state, "
       "found "
       "'dance'");
