@@ -95,7 +95,7 @@ export function make_finish(session) {
 /** A switch for each line of light on the prototype. */
 export function make_lines(session) {
   const list = h("div", { class: "choices wrap" });
-  const node = h("div", { class: "stack", "data-needs": "work", hidden: true }, h("h3", {}, "Lines"), list);
+  const node = h("div", { class: "stack", "data-needs": "work", "data-action": "line", hidden: true }, h("h3", {}, "Lines"), list);
   const is_on = (name) => (session.state?.lines_on ?? []).includes(name);
   node.show = ({ lines = [], lines_on = [] }) => {
     node.hidden = lines.length === 0;
