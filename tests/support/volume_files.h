@@ -116,7 +116,9 @@ struct DicomFile {
               item(0xe000, "") + item(0xe000, pixels) + number16(0xfffe) + number16(0xe0dd) + number32(0);
     else
       put(0x7fe0, 0x0010, allocated == 8 && is_explicit ? "OB" : "OW", pixels);
-    return std::string(128, '\0') + "DICM" + length + meta + data;
+    std::string file(128, '\0');
+    file.append("DICM").append(length).append(meta).append(data);
+    return file;
   }
 
   void add_value(int value) {

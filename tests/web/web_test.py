@@ -269,7 +269,8 @@ class Checks:
     @check
     def sliders_follow_others(self):
         values = lambda scope: self.browser.script(
-            "return [...document.querySelectorAll(arguments[0])].map((input) => input.value)",
+            "return [...document.querySelectorAll(arguments[0])].filter((input) => !input.closest('.stack[hidden]'))"
+            ".map((input) => input.value)",  # a mesh has no window, whose sliders are hidden
             f"{scope} input[type=color], {scope} .named input[type=range]")
         self.tab("parts")
         first = values(MIRROR)
