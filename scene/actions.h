@@ -23,7 +23,7 @@ const std::string& name_of(Role role);  ///< "look", "work", "operate"
 /// punctuation are their characters, letters in upper case ('N').
 enum class Key : int { none = 0, tab = 258, right = 262, left = 263, page_up = 266, page_down = 267 };
 
-/// What an action works on (actions.cpp).
+/// What an action works on (action_functions.h).
 struct Change;
 
 /// A row of the table of actions: everything that the rest of Limn knows about an action.

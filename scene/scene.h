@@ -148,12 +148,6 @@ Result<Scene> load_usable_scene(const std::filesystem::path& path);
 /// Removes the slots without variants, and their controls.
 void leave_out_empty_slots(Scene* scene);
 
-/// A question for people about an auto-imported variant whose unit is a guess, with the way to answer it;
-/// empty for other variants.
-std::string units_question(const Slot& slot, const Variant& variant);
-/// The text of slots/NAME/units.json with one more unit.
-std::string units_json(const Slot& slot, const std::string& variant, LengthUnit units);
-
 /// Reads a viewer file (docs/formats.md): {"world_from_viewer": POSE, "size": [w,h], "fov_deg": 40}.
 Result<Imager> load_viewer(const std::filesystem::path& path);
 

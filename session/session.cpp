@@ -5,6 +5,7 @@
 
 #include "core/log.h"
 #include "core/stopwatch.h"
+#include "scene/part_units.h"
 #include "session/scene_change.h"
 
 namespace limn::session {

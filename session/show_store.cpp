@@ -4,6 +4,7 @@
 #include "core/image_io.h"
 #include "core/log.h"
 #include "scene/kept_files.h"
+#include "scene/part_units.h"
 #include "session/contact_sheet.h"
 
 namespace limn::session {

@@ -14,6 +14,7 @@
 #include "exchange/cad_import.h"
 #include "scene/meshes/cad_file.h"
 #include "scene/meshes/mesh.h"
+#include "scene/part_units.h"
 #include "scene/scene.h"
 #include "tests/exchange/cad_folder.h"
 

@@ -7,6 +7,7 @@
 
 #include "core/file.h"
 #include "core/image_io.h"
+#include "scene/part_units.h"
 #include "scene/posed_scene.h"
 #include "tests/support/matchers.h"
 

@@ -13,6 +13,7 @@
 #include "core/image_io.h"
 #include "core/scale_resolution.h"
 #include "device/gl_context.h"
+#include "scene/part_units.h"
 #include "session/session.h"
 #include "sim/ray_scene.h"
 #include "sim/virtual_rig.h"
