@@ -297,6 +297,8 @@ TEST_F(GlassesInASession, ChangeNoProjectorImageWhetherOnOrOff) {
 
 TEST_F(GlassesInASession, GetMeshesAndTheLight) {
   play_while([&] {
+    // The first state says that the session has begun.
+    ASSERT_TRUE(guest(Role::look, "Ben")->message_of("state"));
     const std::string token = token_of(Role::look, "Ann");
     const auto prototype = client()->get("/glasses/prototype.glb", token);
     EXPECT_EQ(prototype.status, 200);
