@@ -5,7 +5,6 @@
 #include <cmath>
 #include <compare>
 #include <cstdint>
-#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <span>
 #include <utility>
@@ -128,18 +127,7 @@ bool is_solid(const scene::Mesh& mesh, std::span<const GpuTriangle> linked) {
 // Appends a mesh's triangles with the ids of their neighbours. Where more than two triangles share a side,
 // each gets one neighbour. Corners at the same position count as one.
 void append_linked(const scene::Mesh& mesh, std::vector<GpuTriangle>* triangles) {
-  std::vector<std::uint32_t> by_place(mesh.positions.size()), place(mesh.positions.size());
-  std::iota(by_place.begin(), by_place.end(), 0U);
-  const auto coordinates = [&](std::uint32_t i) {
-    const Eigen::Vector3f& p = mesh.positions[i];
-    return std::array<float, 3>{p.x(), p.y(), p.z()};
-  };
-  std::sort(by_place.begin(), by_place.end(),
-            [&](std::uint32_t i, std::uint32_t k) { return coordinates(i) < coordinates(k); });
-  for (std::size_t i = 0; i < by_place.size(); ++i) {
-    const bool is_same = i > 0 && coordinates(by_place[i]) == coordinates(by_place[i - 1]);
-    place[by_place[i]] = is_same ? place[by_place[i - 1]] : by_place[i];
-  }
+  const std::vector<std::uint32_t> place = scene::first_at_place(mesh);
   struct Side {
     std::uint32_t lower, upper;  // indices of positions
     std::uint32_t corner;        // index of the opposite corner, three for each triangle

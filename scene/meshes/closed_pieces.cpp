@@ -1,29 +1,11 @@
 #include "scene/meshes/closed_pieces.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <numeric>
 
 namespace limn::scene {
 namespace {
-
-// For each vertex the first vertex at its position.
-std::vector<std::uint32_t> places_of(const Mesh& mesh) {
-  std::vector<std::uint32_t> by_place(mesh.positions.size()), place(mesh.positions.size());
-  std::iota(by_place.begin(), by_place.end(), 0U);
-  const auto coordinates = [&](std::uint32_t i) {
-    const Eigen::Vector3f& p = mesh.positions[i];
-    return std::array<float, 3>{p.x(), p.y(), p.z()};
-  };
-  std::sort(by_place.begin(), by_place.end(),
-            [&](std::uint32_t i, std::uint32_t k) { return coordinates(i) < coordinates(k); });
-  for (std::size_t i = 0; i < by_place.size(); ++i) {
-    const bool is_same = i > 0 && coordinates(by_place[i]) == coordinates(by_place[i - 1]);
-    place[by_place[i]] = is_same ? place[by_place[i - 1]] : by_place[i];
-  }
-  return place;
-}
 
 struct Side {
   std::uint32_t lower, upper;  // places
@@ -34,7 +16,7 @@ struct Side {
 };
 
 std::vector<Side> sides_of(const Mesh& mesh) {
-  const std::vector<std::uint32_t> place = places_of(mesh);
+  const std::vector<std::uint32_t> place = first_at_place(mesh);
   std::vector<Side> sides;
   sides.reserve(3 * mesh.triangles.size());
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t)

@@ -1,6 +1,9 @@
 #include "scene/meshes/mesh.h"
 
+#include <algorithm>
+#include <array>
 #include <mutex>
+#include <numeric>
 
 #include "scene/meshes/cad_file.h"
 #include "scene/meshes/mesh_content.h"
@@ -82,6 +85,22 @@ Result<MeshWithVariants> load_mesh_with_variants(const fs::path& path,
                                                  const std::stop_token& stop) {
   LIMN_TRY(MeshContent content, load_content(path, stop));
   return meshes_from_content(std::move(content), path, units);
+}
+
+std::vector<std::uint32_t> first_at_place(const Mesh& mesh) {
+  std::vector<std::uint32_t> by_place(mesh.positions.size()), place(mesh.positions.size());
+  std::iota(by_place.begin(), by_place.end(), 0U);
+  const auto coordinates = [&](std::uint32_t i) {
+    const Eigen::Vector3f& p = mesh.positions[i];
+    return std::array<float, 3>{p.x(), p.y(), p.z()};
+  };
+  std::sort(by_place.begin(), by_place.end(),
+            [&](std::uint32_t i, std::uint32_t k) { return coordinates(i) < coordinates(k); });
+  for (std::size_t i = 0; i < by_place.size(); ++i) {
+    const bool is_same = i > 0 && coordinates(by_place[i]) == coordinates(by_place[i - 1]);
+    place[by_place[i]] = is_same ? place[by_place[i - 1]] : by_place[i];
+  }
+  return place;
 }
 
 }  // namespace limn::scene

@@ -44,6 +44,9 @@ double metres_per_unit(LengthUnit units);
 /// warning. Errors: unreadable or truncated file, no triangles, NaN or infinite coordinates, no unit.
 Result<Mesh> load_mesh(const std::filesystem::path& path, std::optional<LengthUnit> units);
 
+/// For each vertex, the first vertex at its position.
+std::vector<std::uint32_t> first_at_place(const Mesh& mesh);
+
 /// A mesh with the other materials that its file offers under names (glTF's KHR_materials_variants).
 struct MeshWithVariants {
   struct Variant {

@@ -7,6 +7,7 @@
 #include "core/scale_resolution.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
+#include "tests/projector/bowed_panel.h"
 #include "tests/projector/judged_image.h"
 #include "tests/support/matchers.h"
 
@@ -14,24 +15,6 @@ namespace limn::projector {
 namespace {
 
 using FinishTest = RendererTest;
-
-constexpr double k_width = 0.5, k_height = 0.36, k_bow = 0.05;  // m
-
-// A bowed panel with texture coordinates; its middle is nearest to the viewer.
-Mesh bowed_panel() {
-  Mesh mesh = test::grid(40, 2, [](double u, double v) {
-    const double x = k_width * (u - 0.5);
-    return Vector3d(x, k_height * (v - 0.5), k_bow * std::pow(2 * x / k_width, 2));
-  });
-  mesh.normals.clear();
-  for (const auto& p : mesh.positions) {
-    const float slope = static_cast<float>(8 * k_bow / (k_width * k_width)) * p.x();
-    mesh.normals.push_back(Eigen::Vector3f(slope, 0, -1).normalized());
-    mesh.uvs.emplace_back(p.x() / static_cast<float>(k_width) + 0.5F,
-                          0.5F - p.y() / static_cast<float>(k_height));
-  }
-  return mesh;
-}
 
 // Soft stripes; with alpha they fade to nothing towards the image's sides.
 cv::Mat stripes(bool with_alpha) {
@@ -85,7 +68,7 @@ JudgedRoom room_with(bool has_light) {
   Mesh badge = coloured(sheet(0.08, 0.08, -0.0003), {0.1F, 0.2F, 0.7F}, false),
        knob = sheet(0.06, 0.06, -0.06);
   knob.materials[0].base_colour = {0.2F, 0.6F, 0.2F};
-  Scene scene = scene_of(bowed_panel(),
+  Scene scene = scene_of(bowed_panel(40),
                          {slot("badge", scene::Mode::surface, badge), slot("knob", scene::Mode::view, knob)});
   scene.finishes = finishes();
   if (has_light)

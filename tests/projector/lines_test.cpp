@@ -8,6 +8,7 @@
 #include "scene/lines/drape.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
+#include "tests/projector/bowed_panel.h"
 #include "tests/projector/judged_image.h"
 #include "tests/support/matchers.h"
 
@@ -15,25 +16,6 @@ namespace limn::projector {
 namespace {
 
 using LinesTest = RendererTest;
-
-constexpr double k_width = 0.5, k_height = 0.36, k_bow = 0.05;  // m
-double bow_at(double x) { return k_bow * std::pow(2 * x / k_width, 2); }
-
-// A bowed panel; its middle is nearest to the viewer.
-Mesh bowed_panel() {
-  Mesh mesh = test::grid(60, 2, [](double u, double v) {
-    const double x = k_width * (u - 0.5);
-    return Vector3d(x, k_height * (v - 0.5), bow_at(x));
-  });
-  mesh.normals.clear();
-  for (const auto& p : mesh.positions) {
-    const float slope = static_cast<float>(8 * k_bow / (k_width * k_width)) * p.x();
-    mesh.normals.push_back(Eigen::Vector3f(slope, 0, -1).normalized());
-    mesh.uvs.emplace_back(p.x() / static_cast<float>(k_width) + 0.5F,
-                          0.5F - p.y() / static_cast<float>(k_height));
-  }
-  return mesh;
-}
 
 scene::Line repeated(const std::string& name,
                      scene::RepeatedLines::Form form,
@@ -67,7 +49,7 @@ std::vector<Vector3d> across(double y) {
 }
 
 JudgedRoom room_of(std::vector<scene::Line> lines) {
-  Scene scene = scene_of(bowed_panel(), {});
+  Scene scene = scene_of(bowed_panel(60), {});
   scene.lines = std::move(lines);
   scene::Finish dark;
   dark.name = "dark";
@@ -128,7 +110,7 @@ void expect_lines_agree(Renderer* drawing, const JudgedRoom& room, int least) {
 
 TEST_F(LinesTest, LightAndCompositesAreThoseOfTheRayTracer) {
   using enum scene::RepeatedLines::Form;
-  const Mesh mesh = bowed_panel();
+  const Mesh mesh = bowed_panel(60);
   scene::Line grid_in_box = repeated("grid", grid, 0.05, 0.012);
   grid_in_box.repeated->half_size_m = {0.12, 0.08};
   grid_in_box.repeated->prototype_from_lines = Pose(exp_rotation({0, 0, 0.3}), {-0.05, 0.02, 0});
@@ -225,7 +207,7 @@ Seen seen_lines(const JudgedRoom& room, const cv::Mat& shown, int axis, double s
 
 // The camera's pixels see 1.3 mm of the panel, the projector's light as much.
 TEST_F(LinesTest, ThinLinesAreSeenWhereTheyShouldBe) {
-  const Mesh mesh = bowed_panel();
+  const Mesh mesh = bowed_panel(60);
   JudgedRoom room =
       room_of({repeated("sections", scene::RepeatedLines::Form::stripes, 0.04, 0.7e-3),
                curve(mesh, "curve", across(0.05), 0.7e-3), curve(mesh, "curve 2", across(-0.05), 0.7e-3)});

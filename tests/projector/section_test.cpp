@@ -83,17 +83,19 @@ std::optional<Vector3d> on_plane(const Imager& viewer, const CutPlane& plane, do
   return world_from_viewer.translation + t * d;
 }
 
-// Whether what lies within `px` pixels of a pixel on the plane is all inside the mesh (1), all outside (-1),
-// or both (0).
+// Whether what lies within `px` pixels of a pixel on the plane, and just below and above the plane there, is all
+// inside the mesh (1), all outside (-1), or both (0). On a face in the plane neither answer is wrong.
 int around(const Mesh& mesh, const Imager& viewer, const CutPlane& plane, double x, double y, double px) {
   int inside = 0;
   for (int i = 0; i < 25; ++i) {
     const auto p = on_plane(viewer, plane, x + px * (i % 5 - 2) / 2, y + px * (i / 5 - 2) / 2);
-    const double w = p ? std::abs(windings(mesh, *p)) : 0;
-    if (w > 0.1 && w < 0.9) return 0;  // on the surface
-    inside += w > 0.5;
+    for (const double side : {-2 * scene::k_cut_margin_m, 2 * scene::k_cut_margin_m}) {
+      const double w = p ? std::abs(windings(mesh, *p + side * plane.normal)) : 0;
+      if (w > 0.1 && w < 0.9) return 0;  // on the surface
+      inside += w > 0.5;
+    }
   }
-  return inside == 25 ? 1 : inside == 0 ? -1 : 0;
+  return inside == 50 ? 1 : inside == 0 ? -1 : 0;
 }
 
 const Vector3d k_cap(1, 0, 1);  // magenta, which no part has
