@@ -35,14 +35,11 @@ Status load_albedo_image(const fs::path& path, const fs::path& scene_path, Proto
   return {};
 }
 
-Status load_files(const SceneFiles& files,
-                  const fs::path& path,
-                  const std::stop_token& stop,
-                  Scene* scene,
-                  LeftOut* left_out) {
+Status load_files(
+    const SceneFiles& files, const fs::path& path, const CadWait& wait, Scene* scene, LeftOut* left_out) {
   if (scene->prototype) {
     const MeshFile& file = *files.prototype_mesh;
-    LIMN_TRY(scene->prototype->mesh, load_listed_mesh(file, path, stop));
+    LIMN_TRY(scene->prototype->mesh, load_listed_mesh(file, path, wait));
     for (Material& material : scene->prototype->mesh.materials)
       material.cut_below = 0;  // the physical prototype has no transparent parts
     if (files.albedo_image) {
@@ -63,7 +60,7 @@ Status load_files(const SceneFiles& files,
   for (Slot& slot : scene->slots) {
     const auto own = listed.first(slot.variants.size());
     listed = listed.subspan(own.size());
-    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, stop, &slot, left_out));
+    LIMN_TRY_STATUS(load_variants(own, path, scene->folder, wait, &slot, left_out));
   }
   find_strays(*scene, left_out);
   return {};
@@ -113,13 +110,13 @@ void leave_out_empty_slots(Scene* scene) {
 Result<Scene> load_scene(const fs::path& path,
                          std::vector<SkippedVariant>* skipped_variants,
                          EmptySlots empty_slots) {
-  return load_scene(path, skipped_variants, empty_slots, std::stop_token());
+  return load_scene(path, skipped_variants, empty_slots, CadWait());
 }
 
 Result<Scene> load_scene(const fs::path& path,
                          std::vector<SkippedVariant>* skipped_variants,
                          EmptySlots empty_slots,
-                         const std::stop_token& stop) {
+                         const CadWait& wait) {
   std::error_code code;
   const fs::path file = fs::is_directory(path, code) ? path / "scene.json" : path;
   LIMN_TRY(const Config config, Config::load(file, "limn.scene/1"));
@@ -130,7 +127,7 @@ Result<Scene> load_scene(const fs::path& path,
   if (const Status distinct = check_distinct(constellations(scene)); !distinct)
     return error("{}: {}", file.string(), distinct.message());
   LeftOut left_out;
-  LIMN_TRY_STATUS(load_files(files, file, stop, &scene, &left_out));
+  LIMN_TRY_STATUS(load_files(files, file, wait, &scene, &left_out));
   if (!skipped_variants && !left_out.variants.empty()) return error("{}", left_out.variants[0].why);
   if (empty_slots == EmptySlots::left_out) leave_out_empty_slots(&scene);
   for (const auto& list : {left_out.variants, left_out.others})

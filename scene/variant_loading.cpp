@@ -85,7 +85,7 @@ Result<FileVariants> auto_import_mesh(const fs::path& file,
                                       const Slot& slot,
                                       std::span<const Variant> variants,
                                       const std::map<std::string, LengthUnit>& known_units,
-                                      const std::stop_token& stop) {
+                                      const CadWait& wait) {
   const std::string name = is_volume(file) ? volume_stem(file) : file.stem().string();
   if (!is_utf8(name))
     return error("{}: expected a file name in UTF-8, found other bytes. Rename the file.",
@@ -105,7 +105,7 @@ Result<FileVariants> auto_import_mesh(const fs::path& file,
   if (known != known_units.end()) import.units = known->second;
   import.is_guess = !import.units && !states_unit(file);
   LIMN_TRY(MeshWithVariants meshes,
-           load_mesh_with_variants(file, import.is_guess ? LengthUnit::metre : import.units, stop));
+           load_mesh_with_variants(file, import.is_guess ? LengthUnit::metre : import.units, wait));
   Mesh mesh = std::move(meshes.mesh);
   if (import.is_guess) import.units = guessed_units(mesh);
   if (import.is_guess) mesh = scaled(std::move(mesh), *import.units);
@@ -138,14 +138,14 @@ void add_material_variants(const Slot& slot,
 
 }  // namespace
 
-Result<Mesh> load_listed_mesh(const MeshFile& file, const fs::path& scene_path, const std::stop_token& stop) {
-  return checked(load_mesh(file.path, file.units, stop), file, scene_path);
+Result<Mesh> load_listed_mesh(const MeshFile& file, const fs::path& scene_path, const CadWait& wait) {
+  return checked(load_mesh(file.path, file.units, wait), file, scene_path);
 }
 
 Status load_variants(std::span<const MeshFile> listed,
                      const fs::path& path,
                      const fs::path& scene_folder,
-                     const std::stop_token& stop,
+                     const CadWait& wait,
                      Slot* slot,
                      LeftOut* left_out) {
   std::vector<Variant> variants;
@@ -159,7 +159,7 @@ Status load_variants(std::span<const MeshFile> listed,
         left_out->variants.push_back({slot->name, name, volume.message(), i == 0});
       continue;
     }
-    auto meshes = checked(load_mesh_with_variants(listed[i].path, listed[i].units, stop), listed[i], path);
+    auto meshes = checked(load_mesh_with_variants(listed[i].path, listed[i].units, wait), listed[i], path);
     if (!meshes) {
       left_out->variants.push_back({slot->name, name, meshes.message(), i == 0});
       continue;
@@ -171,7 +171,7 @@ Status load_variants(std::span<const MeshFile> listed,
   LIMN_TRY(const auto known_units, load_units(folder / "units.json"));
   const SlotFolder files = list_slot_folder(folder);
   for (const fs::path& file : files.meshes) {
-    auto found = auto_import_mesh(file, *slot, variants, known_units, stop);
+    auto found = auto_import_mesh(file, *slot, variants, known_units, wait);
     if (!found) {
       left_out->variants.push_back(
           {slot->name, as_utf8(is_volume(file) ? volume_stem(file) : file.stem().string()), found.message()});

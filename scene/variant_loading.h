@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <span>
-#include <stop_token>
 #include <vector>
 
 #include "core/result.h"
@@ -21,14 +20,14 @@ struct LeftOut {
 /// much too small or large for an object.
 Result<Mesh> load_listed_mesh(const MeshFile& file,
                               const std::filesystem::path& scene_path,
-                              const std::stop_token& stop);
+                              const CadWait& wait);
 
 /// Loads the variants that scene.json lists, and the meshes in slots/NAME/. Those that cannot be loaded are
 /// left out. Error: units.json cannot be read.
 Status load_variants(std::span<const MeshFile> listed,
                      const std::filesystem::path& path,
                      const std::filesystem::path& scene_folder,
-                     const std::stop_token& stop,
+                     const CadWait& wait,
                      Slot* slot,
                      LeftOut* left_out);
 

@@ -1,5 +1,7 @@
 #include "session/scene_watch.h"
 
+#include <utility>
+
 #include "scene/meshes/cad_file.h"
 #include "scene/scene_loading.h"
 
@@ -37,10 +39,37 @@ SceneWatch::Files SceneWatch::listed() const {
   return files;
 }
 
+SceneWatch::Loading SceneWatch::load(bool reads_cad) const {
+  std::vector<fs::path> unread;
+  LoadedScene in;
+  auto scene = scene::load_scene(folder_, &in.skipped_variants, scene::EmptySlots::kept,
+                                 {stop_.get_token(), reads_cad ? nullptr : &unread});
+  if (!scene) return {scene.error(), std::move(unread)};
+  in.scene = std::move(*scene);
+  return {std::move(in), std::move(unread)};
+}
+
+// Reads CAD files, so that what is made of them is kept. What cannot be kept is read once more when the scene
+// is loaded.
+void SceneWatch::read_cad(const std::vector<fs::path>& files) {
+  std::vector<fs::path> fresh;
+  for (const fs::path& file : files)
+    if (tried_cad_.insert(file).second) fresh.push_back(file);
+  reads_cad_ = fresh.empty();
+  reading_ = std::async(std::launch::async, [fresh, stop = stop_.get_token()] {
+    for (const fs::path& file : fresh) static_cast<void>(scene::cad_as_glb(file, {}, {stop}));
+  });
+}
+
 std::optional<Result<LoadedScene>> SceneWatch::take_changed_scene() {
+  const auto is_ready = [](const auto& future) {
+    return future.wait_for(std::chrono::seconds(0)) == std::future_status::ready;
+  };
   if (loading_.valid()) {
-    if (loading_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return std::nullopt;
-    return loading_.get();
+    if (!is_ready(loading_)) return std::nullopt;
+    Loading loaded = loading_.get();
+    if (!loaded.unread_cad.empty() && !reading_.valid()) read_cad(loaded.unread_cad);
+    return std::move(loaded.scene);
   }
   const auto now = Clock::now();
   if (now - looked_at_ < k_look_every) return std::nullopt;
@@ -49,15 +78,14 @@ std::optional<Result<LoadedScene>> SceneWatch::take_changed_scene() {
   if (files != seen_) {
     seen_ = std::move(files);
     changed_at_ = now;
+    tried_cad_.clear();
   }
-  if (seen_ == loaded_ || now - changed_at_ < k_left_alone) return std::nullopt;
+  const bool has_read = reading_.valid() && is_ready(reading_);
+  if ((seen_ == loaded_ && !has_read) || now - changed_at_ < k_left_alone) return std::nullopt;
+  if (has_read) reading_.get();
   loaded_ = seen_;
-  loading_ =
-      std::async(std::launch::async, [folder = folder_, s = stop_.get_token()]() -> Result<LoadedScene> {
-        LoadedScene in;
-        LIMN_TRY(in.scene, scene::load_scene(folder, &in.skipped_variants, scene::EmptySlots::kept, s));
-        return in;
-      });
+  loading_ = std::async(std::launch::async,
+                        [this, reads = std::exchange(reads_cad_, false)] { return load(reads); });
   return std::nullopt;
 }
 

@@ -115,7 +115,7 @@ bool is_cad_cache_name(const fs::path& path) {
          std::find(k_kept_ends.begin(), k_kept_ends.end(), end) != k_kept_ends.end();
 }
 
-Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const std::stop_token& stop) {
+Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const CadWait& wait) {
   LIMN_TRY_STATUS(check_regular_file(file));
   // A folder that was copied, or that cannot be written, may have the GLB beside the file.
   const fs::path beside = file.parent_path() / fmt::format(".{}.glb", file.filename().string());
@@ -127,10 +127,14 @@ Result<CadGlb> cad_as_glb(const fs::path& file, const CadOptions& options, const
   LIMN_TRY(const fs::path program, limn_cad_for(file));
   const json attempt = attempt_at(file, options, program);
   if (auto failure = kept_failure(failed, attempt)) return *failure;
+  if (wait.unread) {
+    wait.unread->push_back(file);
+    return error("{}: limn-cad is still reading it. It is loaded when that is done.", file.string());
+  }
   const std::vector<std::string> arguments = {"--out",       glb.string(),
                                               "--chord-mm",  fmt::format("{}", options.chord_mm),
                                               "--angle-deg", fmt::format("{}", options.angle_deg)};
-  const auto [report, fails_again] = try_limn_cad(file, arguments, options.limits, stop);
+  const auto [report, fails_again] = try_limn_cad(file, arguments, options.limits, wait.stop);
   std::error_code none;
   if (report) {
     fs::remove(failed, none);

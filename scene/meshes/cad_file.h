@@ -23,6 +23,13 @@ struct CadOptions {
   CadLimits limits = {};
 };
 
+/// What is done about a CAD file that has to be read, which may take minutes.
+struct CadWait {
+  std::stop_token stop = {};  ///< Its reading ends with an error when this is requested.
+  /// If given, the file is added here instead of being read, with an error that says that it is being read.
+  std::vector<std::filesystem::path>* unread = nullptr;
+};
+
 /// A CAD file as triangles.
 struct CadGlb {
   std::filesystem::path path;  ///< In metres.
@@ -37,7 +44,7 @@ struct CadGlb {
 /// start, is tried again. Errors: no regular file; as run_limn_cad().
 Result<CadGlb> cad_as_glb(const std::filesystem::path& file,
                           const CadOptions& options = {},
-                          const std::stop_token& stop = {});
+                          const CadWait& wait = {});
 
 /// What the GLB's content is in the unit and with the warnings of the CAD file.
 MeshContent with_cad_unit(MeshContent content, const CadGlb& glb);

@@ -24,17 +24,17 @@ Result<MeshContent> read_safely(const fs::path& path) {
   return read_mesh_content(path);
 }
 
-Result<MeshContent> load_content(const fs::path& path, const std::stop_token& stop) {
+Result<MeshContent> load_content(const fs::path& path, const CadWait& wait) {
   if (!is_mesh_name(path)) return read_mesh_content(path).error();
   std::error_code none;
   if (!fs::is_regular_file(path, none))
     return error("{}: expected a mesh file, found no file. Check the name.", path.string());
   if (is_cad_name(path)) {
-    LIMN_TRY(CadGlb glb, cad_as_glb(path, {}, stop));
+    LIMN_TRY(CadGlb glb, cad_as_glb(path, {}, wait));
     auto triangles = read_safely(glb.path);
     if (!triangles) {  // what was kept has been damaged since
       fs::remove(glb.path, none);
-      LIMN_TRY(glb, cad_as_glb(path, {}, stop));
+      LIMN_TRY(glb, cad_as_glb(path, {}, wait));
       LIMN_TRY(triangles, read_safely(glb.path));
     }
     return with_cad_unit(std::move(*triangles), glb);
@@ -61,11 +61,11 @@ double metres_per_unit(LengthUnit units) {
 }
 
 Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units) {
-  return load_mesh(path, units, std::stop_token());
+  return load_mesh(path, units, CadWait());
 }
 
-Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units, const std::stop_token& stop) {
-  LIMN_TRY(MeshContent content, load_content(path, stop));
+Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units, const CadWait& wait) {
+  LIMN_TRY(MeshContent content, load_content(path, wait));
   if (!content.variants.empty())
     content.warnings.push_back(fmt::format(
         "{}: its {} material variants are not used here; it has the materials that the file uses by default.",
@@ -77,13 +77,13 @@ Result<Mesh> load_mesh(const fs::path& path, std::optional<LengthUnit> units, co
 }
 
 Result<MeshWithVariants> load_mesh_with_variants(const fs::path& path, std::optional<LengthUnit> units) {
-  return load_mesh_with_variants(path, units, std::stop_token());
+  return load_mesh_with_variants(path, units, CadWait());
 }
 
 Result<MeshWithVariants> load_mesh_with_variants(const fs::path& path,
                                                  std::optional<LengthUnit> units,
-                                                 const std::stop_token& stop) {
-  LIMN_TRY(MeshContent content, load_content(path, stop));
+                                                 const CadWait& wait) {
+  LIMN_TRY(MeshContent content, load_content(path, wait));
   return meshes_from_content(std::move(content), path, units);
 }
 
