@@ -9,6 +9,8 @@
 #include "apps/import_rig.h"
 #include "apps/render.h"
 #include "exchange/cad_import.h"
+#include "exchange/line_export.h"
+#include "exchange/line_import.h"
 
 namespace limn::apps {
 namespace {
@@ -86,6 +88,88 @@ CLI::App* add_import_cad(CLI::App* import, Run& run) {
   command->add_flag("--json", options->json, "Print limn.cad/1 instead of a line for each solid");
   command->callback(
       [options, &run] { run = [options] { return report_result(exchange::import_cad(*options)); }; });
+  return command;
+}
+
+CLI::App* add_import_lines(CLI::App* import, Run& run) {
+  auto* command = import->add_subcommand("lines", "Add the curves of a file to a scene as lines of light");
+  command->footer(
+      "The file is in the prototype's frame: CSV and DXF in millimetres (DXF in the unit that it states), "
+      "STEP "
+      "and IGES\n"
+      "(with limn-cad) the curves that bound no surface. Curves must lie within 20 mm of the prototype. "
+      "Their "
+      "points become\n"
+      "SCENE/lines/NAME.csv, and scene.json names them under \"lines\"; all else in it stays, also comments. "
+      "A "
+      "session that\n"
+      "shows the scene shows them at once.\n"
+      "Example: limn import lines sill.step --scene scene\n"
+      "Example: limn import lines lines.csv --scene scene --name trim --colour 1,0.4,0 --width-mm 1\n"
+      "Example: limn import lines sill.dxf --scene scene --replace");
+  auto options = std::make_shared<exchange::LineImportOptions>();
+  command->add_option("file", options->file, "File of curves: .csv, .dxf, .step, .stp, .iges or .igs")
+      ->type_name("FILE")
+      ->required();
+  command->add_option("--scene", options->scene, "Scene folder or its scene.json, which is changed")
+      ->type_name("SCENE")
+      ->required();
+  command
+      ->add_option("--name", options->name,
+                   "All curves become one line of this name (without it: a line for each name of the file)")
+      ->type_name("NAME");
+  command->add_flag("--replace", options->replace,
+                    "Lines that the scene has get the file's curves, and keep their colour and width");
+  auto colour = std::make_shared<std::vector<double>>();
+  command
+      ->add_option("--colour", *colour,
+                   "Colour of new lines: linear red, green and blue from 0 to 1 (without it: white)")
+      ->type_name("R,G,B")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(CLI::Range(0.0, 1.0));
+  command->add_option("--width-mm", options->width_mm, "Width of new lines in mm (without it: 0.7)")
+      ->check(CLI::Range(0.05, 20.0));
+  command->add_flag("--json", options->json, "Print limn.lines/1 instead of a sentence for each line");
+  command->callback([options, colour, &run] {
+    if (colour->size() == 3) options->colour = Eigen::Vector3d(colour->data());
+    run = [options] { return report_result(exchange::import_lines(*options)); };
+  });
+  return command;
+}
+
+// The subcommand of `export`.
+CLI::App* add_export_lines(CLI::App* parent, Run& run) {
+  auto* command = parent->add_subcommand(
+      "lines", "Write the curves of a scene's lines of light, in the prototype's frame");
+  command->footer(
+      "Curves, texts and dimensions of the scene, and the lines that were drawn in sessions and kept in "
+      "looks, "
+      "as they lie\n"
+      "on the surface, in millimetres. Section lines, patterns and outlines of parts are no curves and are "
+      "left "
+      "out.\n"
+      "STEP needs the program limn-cad (apt install limn-cad).\n"
+      "Example: limn export lines --scene scene --out lines.step\n"
+      "Example: limn export lines --scene scene --look evening --line sill --out sill.dxf");
+  auto options = std::make_shared<exchange::LineExportOptions>();
+  command->add_option("--scene", options->scene, "Scene folder or its scene.json")
+      ->type_name("SCENE")
+      ->required();
+  command
+      ->add_option(
+          "--look", options->look,
+          "Only the lines that this look shows (without it: those of the scene, and the drawn ones of "
+          "all looks)")
+      ->type_name("LOOK");
+  command->add_option("--line", options->lines, "Only this line; repeat the option for several")
+      ->type_name("NAME");
+  command->add_option("--out", options->out, "File to write: .csv, .dxf, .step or .stp")
+      ->type_name("FILE")
+      ->required();
+  command->add_flag("--json", options->json, "Print limn.lines/1 instead of a sentence for each line");
+  command->callback(
+      [options, &run] { run = [options] { return report_result(exchange::export_lines(*options)); }; });
   return command;
 }
 
@@ -205,7 +289,8 @@ void add_export(CLI::App& app, Run& run) {
       "Example: limn export --mpcdi door.mpcdi --rig rig --scene config/scenes/door --poses poses.json\n"
       "Example: limn export --warp warps --format exr --rig rig --scene config/scenes/door --poses "
       "poses.json\n"
-      "Example: limn export --opencv cameras --kalibr camchain.yaml --rig rig");
+      "Example: limn export --opencv cameras --kalibr camchain.yaml --rig rig\n"
+      "Lines of light: limn export lines --help");
   auto options = std::make_shared<exchange::ExportOptions>();
   command->add_option("--mpcdi", options->mpcdi, "MPCDI archive to write")->type_name("FILE.mpcdi");
   add_choice(command, "--profile", &options->profile, exchange::k_written_mpcdi_profiles,
@@ -232,9 +317,10 @@ void add_export(CLI::App& app, Run& run) {
       ->add_option("--kalibr", options->kalibr,
                    "Kalibr's camchain to write: cameras, then projectors, each relative to the one before")
       ->type_name("FILE.yaml");
-  command->add_option("--rig", options->rig, "Rig folder, rig.json or folder of .cameramodel files")
-      ->type_name("RIG")
-      ->required();
+  command
+      ->add_option("--rig", options->rig,
+                   "Rig folder, rig.json or folder of .cameramodel files, which all of these need")
+      ->type_name("RIG");
   command
       ->add_option("--scene", options->scene,
                    "Scene folder or its scene.json, for --mpcdi, --warp and --looks")
@@ -247,7 +333,10 @@ void add_export(CLI::App& app, Run& run) {
       ->type_name("FILE.json");
   auto json = std::make_shared<bool>(false);
   command->add_flag("--json", *json, "Print JSON instead of a line for each projector");
-  command->callback([options, json, &run] {
+  const CLI::App* lines = add_export_lines(command, run);
+  command->callback([options, json, lines, &run] {
+    if (lines->parsed()) return;  // its own callback has set `run`
+    if (options->rig.empty()) throw CLI::RequiredError("--rig");
     run = [options, json] { return report_result(run_export(*options, *json)); };
   });
 }
@@ -260,7 +349,8 @@ void add_import(CLI::App& app, Run& run) {
       "without maps).\n"
       "Example: limn import theirs.mpcdi --out rig\n"
       "Rigs of other programs: limn import rig --help\n"
-      "STEP and IGES files: limn import cad --help");
+      "STEP and IGES files: limn import cad --help\n"
+      "Lines of light: limn import lines --help");
   auto options = std::make_shared<ImportOptions>();
   command->add_option("file", options->file, "Archive (.mpcdi) or XML (.mpcdi.xml)")->type_name("FILE");
   command
@@ -268,9 +358,10 @@ void add_import(CLI::App& app, Run& run) {
                    "Rig folder to write, in the file's own coordinate frame (profile sl)")
       ->type_name("FOLDER");
   command->add_flag("--json", options->json, "Print JSON instead of a line for each region");
-  const CLI::App *rig = add_import_rig(command, run), *cad = add_import_cad(command, run);
-  command->callback([options, rig, cad, &run] {
-    if (rig->parsed() || cad->parsed()) return;  // its own callback has set `run`
+  const CLI::App *rig = add_import_rig(command, run), *cad = add_import_cad(command, run),
+                 *lines = add_import_lines(command, run);
+  command->callback([options, rig, cad, lines, &run] {
+    if (rig->parsed() || cad->parsed() || lines->parsed()) return;  // its own callback has set `run`
     if (options->file.empty()) throw CLI::RequiredError("file");
     run = [options] { return report_result(run_import(*options)); };
   });

@@ -63,8 +63,11 @@ NamedCurve cleaned(NamedCurve curve) {
 
 std::string encode_csv_curves(const std::vector<NamedCurve>& curves) {
   std::string text = "name,x_mm,y_mm,z_mm\r\n";
+  const NamedCurve* before = nullptr;
   for (const NamedCurve& curve : curves) {
     const std::string name = csv_field(curve.name);
+    if (before && before->name == curve.name) text += "\r\n";
+    before = &curve;
     const auto add = [&](const Eigen::Vector3d& p) {
       text += fmt::format("{},{:.4f},{:.4f},{:.4f}\r\n", name, p.x() / k_m_per_mm, p.y() / k_m_per_mm,
                           p.z() / k_m_per_mm);
@@ -78,6 +81,7 @@ std::string encode_csv_curves(const std::vector<NamedCurve>& curves) {
 Result<std::vector<NamedCurve>> decode_csv_curves(const std::string& text, const std::string& where) {
   std::vector<NamedCurve> curves;
   std::size_t points = 0, row_number = 0;
+  bool is_new = true;  // an empty row ends a curve
   std::string_view rest = text;
   if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);
   while (!rest.empty()) {
@@ -85,6 +89,7 @@ Result<std::vector<NamedCurve>> decode_csv_curves(const std::string& text, const
     rest.remove_prefix(std::min(rest.size(), row.size() + 1));
     if (row.ends_with('\r')) row.remove_suffix(1);
     ++row_number;
+    if (row.empty()) is_new = true;
     if (row.empty()) continue;
     const auto fields = fields_of(row);
     if (!fields || fields->size() != 4)
@@ -97,7 +102,8 @@ Result<std::vector<NamedCurve>> decode_csv_curves(const std::string& text, const
       return error("{}: row {}: expected three numbers of millimetres, at most {}, found '{},{},{}'.", where,
                    row_number, k_largest_csv_mm, (*fields)[1].substr(0, 32), (*fields)[2].substr(0, 32),
                    (*fields)[3].substr(0, 32));
-    if (curves.empty() || curves.back().name != fields->front()) curves.push_back({.name = fields->front()});
+    if (is_new || curves.back().name != fields->front()) curves.push_back({.name = fields->front()});
+    is_new = false;
     curves.back().points.push_back(k_m_per_mm * Eigen::Vector3d(*x, *y, *z));
     if (curves.size() > k_most_curves || ++points > k_most_curve_points)
       return error("{}: row {}: expected at most {} curves and {} points, found more.", where, row_number,

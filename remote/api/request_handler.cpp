@@ -36,6 +36,7 @@ const std::vector<RequestHandler::Route>& RequestHandler::routes() {
        &RequestHandler::post_edit},  // the action's own role is checked later
       {"GET", "/api/lines.csv", Role::look, &RequestHandler::get_lines},
       {"GET", "/api/lines.dxf", Role::look, &RequestHandler::get_lines},
+      {"GET", "/api/lines.step", Role::look, &RequestHandler::get_lines},
       {"GET", "/picture/room.jpg", Role::look, &RequestHandler::get_room_image},
       {"GET", "/picture/projector/", Role::look, &RequestHandler::get_projector_image},
       {"GET", "/picture/look/", Role::look, &RequestHandler::get_look_image},
@@ -159,6 +160,8 @@ void RequestHandler::get_lines(const AuthenticatedRequest& request, ResponseCall
   if (curves.empty())
     return respond(
         error_response(k_http_not_found, "expected lines with curves that are shown, found none."));
+  if (request.path.ends_with(".step"))
+    return session_files_.send_step_curves(std::move(curves), std::move(respond));
   if (request.path.ends_with(".dxf"))
     return respond(
         {200, "image/vnd.dxf", exchange::encode_dxf_curves(curves), {{"Cache-Control", "no-store"}}});

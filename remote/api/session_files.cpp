@@ -1,6 +1,9 @@
 #include "remote/api/session_files.h"
 
+#include <stdlib.h>
+
 #include <algorithm>
+#include <filesystem>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -11,6 +14,7 @@
 #include "remote/api/painted_mesh.h"
 #include "remote/api/responses.h"
 #include "scene/kept_files.h"
+#include "scene/lines/line_file.h"
 #include "scene/meshes/glb.h"
 
 namespace limn::remote {
@@ -42,6 +46,21 @@ std::string look_assembly(const scene::Scene& scene, const scene::Look& look) {
         nodes.push_back({part.slot + " " + part.variant, &variant.mesh, part.prototype_from_part});
   }
   return nodes.empty() ? "" : scene::encode_glb(nodes);
+}
+
+HttpResponse step_response(const std::vector<exchange::NamedCurve>& curves) {
+  constexpr scene::CadLimits k_limits{.seconds = 20, .silent_seconds = 20, .memory_mb = 1024};
+  namespace fs = std::filesystem;
+  std::error_code none;
+  std::string name = (fs::temp_directory_path(none) / "limn-lines-XXXXXX").string();
+  if (!mkdtemp(name.data()))
+    return error_response(k_http_unavailable, "expected room for a file, found the disk full or read-only.");
+  const fs::path folder = name, file = folder / "lines.step";
+  const Status written = scene::write_line_file(curves, file, k_limits);
+  auto text = written ? read_file(file) : Result<std::string>(written.error());
+  fs::remove_all(folder, none);
+  return text ? uncached_response("model/step", std::move(*text))
+              : error_response(k_http_unavailable, text.message());
 }
 
 }  // namespace
@@ -77,6 +96,10 @@ void SessionFiles::send_projector_image(const std::string& path,
         return uncached_response("image/jpeg", *encoded.jpeg);
       },
       std::move(respond));
+}
+
+void SessionFiles::send_step_curves(std::vector<exchange::NamedCurve> curves, ResponseCallback respond) {
+  respond_from_worker([curves = std::move(curves)] { return step_response(curves); }, std::move(respond));
 }
 
 void SessionFiles::send_look_image(const std::string& path,

@@ -5,8 +5,10 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "core/worker_thread.h"
+#include "exchange/curves/named_curve.h"
 #include "remote/api/session_update.h"
 #include "remote/api/thumbnails.h"
 #include "remote/http/http.h"
@@ -31,6 +33,9 @@ class SessionFiles {
   void send_mesh(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
   /// /picture/variant/SLOT/VARIANT.png: a variant by itself.
   void send_variant_image(const std::string& path, const SessionUpdate* update, ResponseCallback respond);
+
+  /// Curves as a STEP file, which limn-cad writes. Status 503: it is not installed, or fails.
+  void send_step_curves(std::vector<exchange::NamedCurve> curves, ResponseCallback respond);
 
  private:
   void respond_from_worker(std::function<HttpResponse()> job, ResponseCallback respond);

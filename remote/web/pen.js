@@ -56,6 +56,20 @@ class Stroke {
   }
 }
 
+// Follows a link whose file may not be there (STEP needs limn-cad at the session's machine), and says why.
+async function download(event, session) {
+  event.preventDefault();
+  const link = event.currentTarget;
+  const answer = await fetch(link.href).catch(() => null);
+  if (!answer?.ok) {
+    const refusal = await answer?.json().catch(() => null);
+    return session.say(refusal?.error ?? "The session does not answer.", true);
+  }
+  const href = URL.createObjectURL(await answer.blob());
+  h("a", { href, download: link.download }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 60000);
+}
+
 /** Draws, moves, smooths, renames and removes drawn lines, and saves them to files. */
 export function make_pen(session) {
   let mode = "off",
@@ -134,6 +148,7 @@ export function make_pen(session) {
       on_chosen({ "data-action": "erase_line", "data-needs": role_of("erase_line") }, "Remove"),
       h("a", { href: "/api/lines.csv", download: "lines.csv" }, "CSV"),
       h("a", { href: "/api/lines.dxf", download: "lines.dxf" }, "DXF"),
+      h("a", { href: "/api/lines.step", download: "lines.step", onclick: (event) => download(event, session) }, "STEP"),
     ),
     h("div", { class: "line named" }, name, on_chosen({ "data-action": "rename_line", "data-needs": role_of("rename_line") }, "Rename")),
   );

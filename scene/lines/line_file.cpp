@@ -10,7 +10,6 @@
 #include "exchange/curves/csv_curves.h"
 #include "exchange/curves/curve_list.h"
 #include "exchange/curves/dxf_curves.h"
-#include "scene/files/cad_program.h"
 
 namespace limn::scene {
 namespace {
@@ -69,7 +68,7 @@ Result<std::vector<NamedCurve>> read_line_file(const fs::path& path) {
   return std::move(list.curves);
 }
 
-Status write_line_file(const std::vector<NamedCurve>& curves, const fs::path& path) {
+Status write_line_file(const std::vector<NamedCurve>& curves, const fs::path& path, const CadLimits& limits) {
   if (curves.empty())
     return error("{}: expected curves to write, found none. Draw a line first.", path.string());
   const std::string ending = ending_of(path);
@@ -79,7 +78,7 @@ Status write_line_file(const std::vector<NamedCurve>& curves, const fs::path& pa
     return error("{}: expected .csv, .dxf, .step or .stp, found another ending.", path.string());
   const fs::path list = path.parent_path() / fmt::format(".{}.curves.json", path.filename().string());
   LIMN_TRY_STATUS(write_file(list, exchange::encode_curve_list({.curves = curves})));
-  const auto written = run_limn_cad(list, {"--out", path.string()});
+  const auto written = run_limn_cad(list, {"--out", path.string()}, limits);
   std::error_code code;
   fs::remove(list, code);
   return written ? Status() : written.error();

@@ -6,6 +6,7 @@
 
 #include "core/result.h"
 #include "exchange/curves/named_curve.h"
+#include "scene/files/cad_program.h"
 
 namespace limn::scene {
 
@@ -18,7 +19,10 @@ const std::string& line_file_endings();
 Result<std::vector<exchange::NamedCurve>> read_line_file(const std::filesystem::path& path);
 
 /// Writes curves as CSV, DXF or STEP (through limn-cad), by the ending of the file's name. The file is
-/// replaced only when it is complete. Errors: another ending, no curves, a file that cannot be written.
-Status write_line_file(const std::vector<exchange::NamedCurve>& curves, const std::filesystem::path& path);
+/// replaced only when it is complete. `limits` are those of limn-cad. Errors: another ending, no curves, a
+/// file that cannot be written, those of run_limn_cad().
+Status write_line_file(const std::vector<exchange::NamedCurve>& curves,
+                       const std::filesystem::path& path,
+                       const CadLimits& limits = {});
 
 }  // namespace limn::scene

@@ -57,8 +57,9 @@ TEST(Documents, EveryCommandAndOptionExists) {
         const test::Outcome outcome = test::run_limn({quoted.command, "--help"});
         help = helps.emplace(quoted.command, outcome.out).first;
         if (quoted.command == "import")
-          for (const char* kind : {"rig", "cad"})
+          for (const char* kind : {"rig", "cad", "lines"})
             help->second += test::run_limn({"import", kind, "--help"}).out;
+        if (quoted.command == "export") help->second += test::run_limn({"export", "lines", "--help"}).out;
         EXPECT_EQ(outcome.code, 0) << quoted.where << ": limn " << quoted.command;
       }
       if (quoted.command == "bench") continue;  // its options belong to the benches
