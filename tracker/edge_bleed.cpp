@@ -15,7 +15,7 @@ constexpr std::size_t k_steps = 8;                    // samples from one cell's
 constexpr std::array<float, 2> k_lines{-0.2F, 0.2F};  // sample lines, in cells beside a cell's middle
 constexpr int k_min_edges = 12;
 constexpr double k_min_contrast = 8;  // light, between two cells
-// A smaller bleed is treated as noise, as curvature is in refine.cpp.
+// A smaller bleed is treated as noise, as curvature is in edge_line_fit.cpp.
 constexpr double k_clear_deviations = 3;
 constexpr double k_unsure_share = 0.2;         // share of the bleed: photographs of boards agree up to it
 constexpr double k_between_markers_px = 0.02;  // smallest standard deviation between an image's markers
@@ -189,7 +189,7 @@ void undo_edge_bleed(const EdgeBleed& bleed,
   const double evidence = square / bleed.variance;
   if (!(evidence > 0)) return;
   // The non-negative garrote, and its expected square error, whether there is a bleed or none; as for
-  // curvature in refine.cpp.
+  // curvature in edge_line_fit.cpp.
   const double share = std::max(0.0, 1 - k_limit / evidence);
   const double probability = 1 / (1 + std::exp(0.5 * (k_limit - evidence)));
   const double off = probability * (1 - share) * (1 - share) + (1 - probability) * share * share;
