@@ -6,7 +6,9 @@
 #include <opencv2/core.hpp>
 
 #include "calib/board/board_finder.h"
+#include "calib/surface/global_registration.h"
 #include "calib/surface/registration.h"
+#include "calib/surface/scan_overlap.h"
 #include "core/log.h"
 #include "core/names.h"
 #include "scene/meshes/mesh_bvh.h"

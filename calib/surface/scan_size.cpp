@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "calib/surface/scan_overlap.h"
+
 namespace limn::calib {
 namespace {
 

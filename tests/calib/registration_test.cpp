@@ -8,6 +8,8 @@
 #include <optional>
 #include <random>
 
+#include "calib/surface/global_registration.h"
+#include "calib/surface/scan_overlap.h"
 #include "calib/surface/scan_size.h"
 #include "sim/car_door.h"
 #include "sim/truth.h"

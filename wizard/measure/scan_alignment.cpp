@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
+#include "calib/surface/global_registration.h"
 #include "core/config.h"
 #include "core/file.h"
 #include "core/image_io.h"

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "calib/surface/registration.h"
+#include "calib/surface/scan_overlap.h"
 #include "calib/surface/scan_size.h"
 #include "core/result.h"
 #include "core/stage.h"
