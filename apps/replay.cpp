@@ -312,6 +312,7 @@ class Comparison final : public session::FrameSink {
 Status run_replay(const ReplayOptions& options) {
   if (!(options.speed >= 0)) return usage_error("--speed: expected 0 or more, found {}.", options.speed);
   LIMN_TRY(session::SessionSetup setup, session::load_setup(options.session));
+  setup.follows_pen = false;  // its strokes were recorded as edits
   LIMN_TRY(const Events events, load_events(options.session / "events.jsonl"));
   LIMN_TRY(const device::GlContext context, device::GlContext::create());
   LIMN_TRY(session::SessionOutput output, session::SessionOutput::open(options.out, {}, &setup));

@@ -163,6 +163,7 @@ std::vector<Body> bodies(const Scene& scene) {
   }
   if (const auto& section = scene.section)
     out.push_back({section_body(), {{section->marker, section->size_m, Pose()}}});
+  if (const auto& pen = scene.pen) out.push_back({pen_body(), {{pen->marker, pen->size_m, Pose()}}});
   return out;
 }
 
@@ -193,6 +194,11 @@ std::string viewer_body(std::size_t viewer) { return fmt::format("(viewer {})", 
 
 const std::string& section_body() {
   static const std::string name = "(section)";
+  return name;
+}
+
+const std::string& pen_body() {
+  static const std::string name = "(pen)";
   return name;
 }
 

@@ -19,6 +19,7 @@
 #include "scene/lines/line.h"
 #include "scene/lines/outline.h"
 #include "scene/meshes/mesh.h"
+#include "scene/pen.h"
 #include "scene/room_image.h"
 #include "scene/room_light.h"
 #include "scene/section.h"
@@ -108,6 +109,7 @@ struct Scene {
   std::optional<RoomLight> light;            ///< Absent: soft light and a lamp that move with the viewer.
   std::optional<RoomImage> room_image = {};  ///< What RoomLight::image_strength is about.
   std::optional<Section> section = {};       ///< What cuts parts open.
+  std::optional<Pen> pen = {};               ///< What draws lines on the prototype.
 
   const Slot* find_slot(const std::string& name) const;
   /// The viewer for a guest's tablet: the one with the guest's name, else the one for every guest. Null when
@@ -152,7 +154,8 @@ void leave_out_empty_slots(Scene* scene);
 Result<Imager> load_viewer(const std::filesystem::path& path);
 
 /// The bodies that carry square markers, for the tracker: "prototype", one body per slot, with the slot's
-/// name, viewer_body(i) for each viewer i with a marker, and section_body() for the section's marker.
+/// name, viewer_body(i) for each viewer i with a marker, section_body() for the section's marker, and
+/// pen_body() for the pen's.
 std::vector<Body> bodies(const Scene& scene);
 /// The bodies that carry balls, with the same names, in their bodies' frames.
 std::vector<Constellation> constellations(const Scene& scene);
@@ -164,6 +167,8 @@ double first_marker_size_m(const Scene& scene);
 std::string viewer_body(std::size_t viewer);
 /// The body's name of the section's marker. It differs from every slot's name.
 const std::string& section_body();
+/// The body's name of the pen's marker. It differs from every slot's name.
+const std::string& pen_body();
 /// The body's name of a marker that carries nothing in the scene. It differs from every slot's name.
 std::string loose_body(const MarkerName& marker);
 bool is_loose_body(const std::string& body);

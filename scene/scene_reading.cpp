@@ -216,21 +216,25 @@ std::vector<Finish> read_finishes(const ConfigNode& node, const Scene& scene) {
   return finishes;
 }
 
+// The marker of a section or pen: a square one that nothing else uses.
+MarkerName read_own_marker(const ConfigNode& node, const char* what, const Scene& scene, Reader* reader) {
+  const MarkerName marker = read_carrier(node, reader);
+  if (is_constellation(marker))
+    node.problem(fmt::format("expected a square marker for the {}, found a constellation.", what));
+  const auto refuse = [&](const char* user) {
+    node.problem(fmt::format("expected a marker that nothing else uses, found {}, which a {} uses.",
+                             marker.text(), user));
+  };
+  if (std::ranges::find(scene.controls, marker, &Control::marker) != scene.controls.end()) refuse("control");
+  if (std::ranges::find(scene.viewers, std::optional(marker), &Viewer::marker) != scene.viewers.end())
+    refuse("viewer");
+  return marker;
+}
+
 // The section, and the control that its marker is.
 void read_section_of(const ConfigNode& node, Reader* reader, Scene* scene) {
   Section section = read_section(node);
-  const ConfigNode marker = node.at("marker");
-  section.marker = read_carrier(marker, reader);
-  if (is_constellation(section.marker))
-    marker.problem("expected a square marker for the section, found a constellation.");
-  for (const Control& control : scene->controls)
-    if (control.marker == section.marker)
-      marker.problem(fmt::format("expected a marker that nothing else uses, found {}, which a control uses.",
-                                 section.marker.text()));
-  for (const Viewer& viewer : scene->viewers)
-    if (viewer.marker == section.marker)
-      marker.problem(fmt::format("expected a marker that nothing else uses, found {}, which a viewer uses.",
-                                 section.marker.text()));
+  section.marker = read_own_marker(node.at("marker"), "section", *scene, reader);
   std::vector<std::string> names;
   for (const Slot& slot : scene->slots) names.push_back(slot.name);
   section.slots = names;
@@ -246,6 +250,13 @@ void read_section_of(const ConfigNode& node, Reader* reader, Scene* scene) {
   scene->controls.push_back(
       {section.marker, ActionId::section, "", Gesture::cover, k_section_changes.text(SectionChange::cover)});
   scene->section = std::move(section);
+}
+
+Pen read_pen_of(const ConfigNode& node, const Scene& scene, Reader* reader) {
+  Pen pen = read_pen(node);
+  pen.marker = read_own_marker(node.at("marker"), "pen", scene, reader);
+  if (!scene.prototype) node.problem("expected a prototype to draw on, found a scene without.");
+  return pen;
 }
 
 bool line_of_slot_exists(const Line& line, const Scene& scene) {
@@ -345,7 +356,8 @@ Imager read_viewer_imager(const ConfigNode& node) {
 }
 
 Scene read_scene(const ConfigNode& root, SceneFiles* files) {
-  root.only({"schema", "prototype", "slots", "controls", "viewer", "light", "finishes", "section", "lines"});
+  root.only(
+      {"schema", "prototype", "slots", "controls", "viewer", "light", "finishes", "section", "lines", "pen"});
   Scene scene;
   Reader reader{files, {}};
   if (const auto node = root.find("prototype")) scene.prototype = read_prototype(*node, &reader);
@@ -361,6 +373,7 @@ Scene read_scene(const ConfigNode& root, SceneFiles* files) {
       scene.room_image = read_room_image(*image, scene.light->d_up_world);
   }
   if (const auto node = root.find("finishes")) scene.finishes = read_finishes(*node, scene);
+  if (const auto node = root.find("pen")) scene.pen = read_pen_of(*node, scene, &reader);
   if (const auto node = root.find("section")) read_section_of(*node, &reader, &scene);
   return scene;
 }

@@ -51,6 +51,7 @@ std::optional<std::string> user_of(const Scene& scene,
       if (known.marker == marker)
         return body.name == "prototype"      ? "the prototype"
                : body.name == section_body() ? "the section"
+               : body.name == pen_body()     ? "the pen"
                                              : "a viewer";
   }
   for (const Control& control : scene.controls)

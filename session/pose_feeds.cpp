@@ -21,6 +21,7 @@ std::map<std::string, tracker::FeedBody> named_bodies(const scene::Scene& scene)
   std::map<std::string, tracker::FeedBody> out;
   for (const std::string& name : scene::body_names(scene)) out[name] = {"", name, std::nullopt};
   if (out.erase(scene::section_body()) > 0) out["section"] = {"", scene::section_body(), std::nullopt};
+  if (out.erase(scene::pen_body()) > 0) out["pen"] = {"", scene::pen_body(), std::nullopt};
   for (std::size_t i = 0; i < scene.viewers.size(); ++i) {
     const scene::Viewer& viewer = scene.viewers[i];
     out.erase(scene::viewer_body(i));

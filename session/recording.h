@@ -29,6 +29,7 @@ struct SessionSetup {
   std::vector<std::string> screens = {};  ///< names of the displays that are not projectors
   /// The newest deviation from the CAD, for machines that draw described frames; null: none.
   std::shared_ptr<const scene::DeviationLayer> deviation = {};
+  bool follows_pen = true;  ///< The scene's pen draws; not in a replay, whose strokes were recorded as edits.
 };
 
 /// Writes rig/, scene/, session.json and, if there is one, the file `deviation`; load_setup() reads them.

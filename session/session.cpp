@@ -71,6 +71,7 @@ void Session::update_percepts(Percepts percepts, std::size_t moments) {
   show_state_ = scene::without_moved_pins(setup_.scene, show_state_, tracks);
   show_state_ = scene::with_section_seen(setup_.scene, std::move(show_state_), tracks);
   section_rest_.note(tracks);
+  draw_with_pen(tracks);
   for (const ControlUse& use : percepts_.uses) {
     const scene::Control& control = setup_.scene.controls[use.control];
     const auto& section = setup_.scene.section;
@@ -84,6 +85,28 @@ void Session::update_percepts(Percepts percepts, std::size_t moments) {
   const auto swapped =
       swapped_.check(setup_.rig, scene::bodies(setup_.scene), percepts_.detections, percepts_.captured_at);
   if (swapped) warn(percepts_.captured_at, *swapped);
+}
+
+// The pen draws as a tablet does, by edits.
+void Session::draw_with_pen(std::span<const Track> tracks) {
+  if (!setup_.scene.pen || !setup_.follows_pen) return;
+  const PenStroke::Addition addition = pen_.note(setup_.scene, tracks, percepts_.captured_at);
+  if (addition.points.empty()) return;
+  if (addition.begins) {
+    pen_line_.clear();
+    is_pen_refused_ = false;
+  }
+  if (is_pen_refused_) return;
+  std::string value = "points";
+  for (const Eigen::Vector3d& p : addition.points)
+    value += fmt::format(" {:.4f} {:.4f} {:.4f}", 1e3 * p.x(), 1e3 * p.y(), 1e3 * p.z());
+  const Status done =
+      edit(scene::make_edit(scene::ActionId::draw_line, pen_line_, value), "pen", percepts_.captured_at);
+  if (!done) {
+    is_pen_refused_ = true;  // until the next stroke
+    return warn(percepts_.captured_at, done.message());
+  }
+  if (pen_line_.empty()) pen_line_ = show_state_.drawn.back().name;
 }
 
 void Session::warn(Stamp at, const std::string& what) {

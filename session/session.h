@@ -15,6 +15,7 @@
 #include "scene/show_state.h"
 #include "session/drift_watch.h"
 #include "session/frame_input.h"
+#include "session/pen/pen_stroke.h"
 #include "session/perception.h"
 #include "session/recording.h"
 #include "session/recovering_composer.h"
@@ -154,6 +155,7 @@ class Session {
   ShownFrame measured() const;
 
  private:
+  void draw_with_pen(std::span<const Track> tracks);
   void request_deviation(const scene::DeviationRequest& request);
   void forget_deviation();
   Session(
@@ -181,6 +183,9 @@ class Session {
   std::vector<std::string> dark_projectors_;
   TabletRegistry tablets_;
   SectionRest section_rest_;
+  PenStroke pen_;
+  std::string pen_line_;  // that the pen draws; empty: none yet
+  bool is_pen_refused_ = false;
   double paint_ms_ = 0, record_ms_ = 0;
 };
 

@@ -97,19 +97,25 @@ std::vector<BodyMarker> slot_markers(const scene::Scene& scene,
   return placed;
 }
 
-// The controls' markers, in a row below the prototype as camera 0 sees it.
+// The markers of the controls and of the pen, in a row below the prototype as camera 0 sees it.
 std::vector<BodyMarker> control_markers(const scene::Scene& scene,
                                         const Eigen::Quaterniond& prototype_from_face) {
   const Eigen::AlignedBox3d box = bounds(scene.prototype->mesh);
   const Eigen::Vector3d d_down = prototype_from_face * Eigen::Vector3d::UnitY();
   const double half_height = 0.5 * d_down.cwiseAbs().dot(box.sizes());
   std::vector<BodyMarker> placed;
-  for (std::size_t i = 0; i < scene.controls.size(); ++i) {
-    const double column = static_cast<double>(i) - 0.5 * static_cast<double>(scene.controls.size() - 1);
+  const std::size_t count = scene.controls.size() + (scene.pen ? 1 : 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double column = static_cast<double>(i) - 0.5 * static_cast<double>(count - 1);
     const Eigen::Vector3d in_face(3 * k_control_size_m * column, half_height + 1.2 * k_control_size_m, 0);
+    const Pose place(prototype_from_face, box.center() + prototype_from_face * in_face);
+    if (i == scene.controls.size()) {
+      placed.push_back({scene.pen->marker, scene.pen->size_m, place});
+      continue;
+    }
     const bool is_section = scene.section && scene.controls[i].marker == scene.section->marker;
-    placed.push_back({scene.controls[i].marker, is_section ? scene.section->size_m : k_control_size_m,
-                      Pose(prototype_from_face, box.center() + prototype_from_face * in_face)});
+    placed.push_back(
+        {scene.controls[i].marker, is_section ? scene.section->size_m : k_control_size_m, place});
   }
   return placed;
 }
