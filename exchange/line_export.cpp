@@ -48,11 +48,22 @@ void add_drawn(const scene::Look& look, scene::PosedScene* posed, std::vector<st
   }
 }
 
+// The lines that sessions keep, as they were at the end of the last one.
+void add_kept(const scene::Scene& scene, scene::PosedScene* posed, std::vector<std::string>* from) {
+  const fs::path file = scene::kept_file(scene.folder, scene::k_drawn_lines_file);
+  if (std::error_code none; !fs::exists(file, none)) return;
+  const auto kept = scene::with_drawn_lines(file, scene, scene::initial_show_state(scene));
+  if (!kept) return log_warning("{} These lines are left out.", kept.message());
+  posed->drawn = kept->drawn;
+  from->assign(posed->drawn.size(), "the last session");
+}
+
 std::vector<LineRow> exported_rows(const scene::Scene& scene,
-                             const std::vector<scene::Look>& looks,
-                             bool is_of_look) {
+                                   const std::vector<scene::Look>& looks,
+                                   bool is_of_look) {
   scene::PosedScene posed;
   std::vector<std::string> from;
+  if (!is_of_look) add_kept(scene, &posed, &from);
   for (const scene::Look& look : looks) add_drawn(look, &posed, &from);
   if (is_of_look)
     posed.lines = looks.front().lines.value_or(scene::first_lines(scene));

@@ -17,10 +17,10 @@ struct LineExportOptions {
 };
 
 /// `limn export lines`: writes the curves of a scene's lines (curves, texts, dimensions) and of lines that
-/// were drawn and kept in looks, as they lie on the surface, in the prototype's frame. A drawn line that
-/// differs between looks is written for each, as "NAME (LOOK)". Section lines, patterns and outlines are no
-/// curves and are left out, with a message. Errors: as load_scene() and write_line_file(); an unknown line or
-/// look; no curves.
+/// were drawn in sessions (drawn.json, looks), as they lie on the surface, in the prototype's frame. A drawn
+/// line that differs between looks is written for each, as "NAME (LOOK)". Section lines, patterns and
+/// outlines are no curves and are left out, with a message. Errors: as load_scene() and write_line_file(); an
+/// unknown line or look; no curves.
 Status export_lines(const LineExportOptions& options);
 
 }  // namespace limn::exchange

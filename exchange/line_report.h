@@ -11,7 +11,7 @@ namespace limn::exchange {
 /// A line that was written, for people and for limn.lines/1.
 struct LineRow {
   std::string name;
-  std::string from;  ///< "the scene", "look NAME", or the file that it is in now.
+  std::string from;  ///< "the scene", "the last session", "look NAME", or the file that it is in now.
   std::vector<NamedCurve> curves = {};
 };
 

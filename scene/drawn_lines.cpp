@@ -6,7 +6,10 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 
+#include "core/config.h"
+#include "core/json_text.h"
 #include "core/names.h"
 #include "scene/lines/drape.h"
 
@@ -172,6 +175,42 @@ Status check_new_name(const Scene& scene, const ShowState& show_state, const std
 }
 
 }  // namespace
+
+std::string drawn_lines_json(const std::vector<DrawnLine>& drawn, const std::vector<std::string>& shown) {
+  nlohmann::ordered_json lines = nlohmann::ordered_json::array(), names = nlohmann::ordered_json::array();
+  for (const DrawnLine& line : drawn) {
+    if (line.curve.points.size() < 2) continue;  // a touch
+    lines.push_back(to_json(line));
+    if (std::find(shown.begin(), shown.end(), line.name) != shown.end()) names.push_back(line.name);
+  }
+  if (lines.empty()) return {};
+  return json_text(nlohmann::ordered_json({{"schema", "limn.drawn/1"}, {"lines", lines}, {"shown", names}})) +
+         "\n";
+}
+
+Result<ShowState> with_drawn_lines(const std::filesystem::path& path,
+                                   const Scene& scene,
+                                   ShowState show_state) {
+  LIMN_TRY(const Config config, Config::load(path, "limn.drawn/1"));
+  const ConfigNode root = config.root();
+  root.only({"schema", "lines", "shown"});
+  std::vector<std::string> shown;
+  for (const ConfigNode& name : root.at("shown").items()) shown.push_back(name.text());
+  for (const ConfigNode& node : root.at("lines").items()) {
+    DrawnLine line = read_drawn_line(node);
+    const bool is_shown = std::find(shown.begin(), shown.end(), line.name) != shown.end();
+    if (find_named(scene.lines, line.name) || find_named(show_state.drawn, line.name))
+      line.name = unused_line_name(scene, show_state);
+    if (is_shown) show_state.lines.push_back(line.name);
+    show_state.drawn.push_back(std::move(line));
+  }
+  LIMN_TRY_STATUS(config.status());
+  if (show_state.drawn.size() > k_most_lines)
+    return error("{}: expected at most {} drawn lines, found more.", path.string(), k_most_lines);
+  if (const Status count = check_count(show_state); !count)
+    return error("{}: {}", path.string(), count.message());
+  return show_state;
+}
 
 std::vector<exchange::NamedCurve> shown_curves(const Scene& scene, const PosedScene& posed) {
   std::vector<exchange::NamedCurve> curves;

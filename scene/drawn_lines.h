@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,14 @@
 #include "scene/show_state.h"
 
 namespace limn::scene {
+
+/// The text of a limn.drawn/1 file: drawn lines, and the names of those that are shown; empty when there are
+/// none. with_drawn_lines() adds those of a file to a show state; one that has the name of a line of the
+/// scene gets another name. Errors: no such file, points that are no line, too many lines or points.
+std::string drawn_lines_json(const std::vector<DrawnLine>& drawn, const std::vector<std::string>& shown);
+Result<ShowState> with_drawn_lines(const std::filesystem::path& path,
+                                   const Scene& scene,
+                                   ShowState show_state);
 
 /// The curves among the lines that a posed scene shows, with their lines' names, in the prototype's frame.
 std::vector<exchange::NamedCurve> shown_curves(const Scene& scene, const PosedScene& posed);

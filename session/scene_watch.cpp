@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "scene/kept_files.h"
 #include "scene/meshes/cad_file.h"
 #include "scene/scene_loading.h"
 
@@ -27,7 +28,8 @@ SceneWatch::Files SceneWatch::listed() const {
     if (at.depth() == 0 && at->path().filename() == "looks") at.disable_recursion_pending();
     std::error_code gone;
     const fs::path name = at->path().filename();
-    const bool is_own = (at.depth() == 0 && (name == "pairings.json" || name == "comments.json")) ||
+    const bool is_own = (at.depth() == 0 && (name == "pairings.json" || name == "comments.json" ||
+                                             name == scene::k_drawn_lines_file)) ||
                         scene::is_cad_cache_name(name);
     if (!is_own && at->is_regular_file(gone)) {
       const auto time = at->last_write_time(gone);

@@ -253,6 +253,7 @@ void Session::check_drift(Stamp now) {
 }
 
 void Session::report_unwritten(Stamp at) {
+  store_.keep_waiting();
   for (const std::string& what : store_.failures()) warn(at, what);
 }
 

@@ -58,7 +58,7 @@ struct Edited {
 class Session {
  public:
   /// Looks are read from the scene's folder `looks` and, with `keeps_looks`, written to it; damaged ones are
-  /// reported and not changed. The same holds for pairings.json and for the answers about units
+  /// reported and not changed. The same holds for pairings.json, drawn.json and the answers about units
   /// (show_store.h). `telemetry` and `recorder` may be null.
   static Result<Session> create(const SessionSetup& setup,
                                 Telemetry* telemetry,
@@ -125,7 +125,7 @@ class Session {
   const ComposedFrame& compose_and_record(Stamp now, Stamp shown_at);
   /// To be called when the composed frame is shown: checks whether a device has moved, and reports it.
   void check_drift(Stamp now);
-  /// Reports looks, pairings and units that could not be written.
+  /// Has drawn lines written, and reports looks, pairings, drawn lines and units that could not be written.
   void report_unwritten(Stamp at);
   /// The files that the session keeps in the scene's folder.
   ShowStore& store() { return store_; }

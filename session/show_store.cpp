@@ -3,6 +3,7 @@
 #include "core/file.h"
 #include "core/image_io.h"
 #include "core/log.h"
+#include "scene/drawn_lines.h"
 #include "scene/kept_files.h"
 #include "scene/part_units.h"
 #include "session/contact_sheet.h"
@@ -13,6 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* k_pairings = "pairings.json";
+constexpr auto k_between_drawn = std::chrono::milliseconds(500);
 constexpr const char* k_deleted = "deleted";  // subfolder of the folder of looks
 
 // Moves a look's files, both or none; a file that does not exist is skipped.
@@ -39,6 +41,15 @@ Status write_look(const fs::path& folder,
   });
 }
 
+// A file of drawn lines that is damaged, or another version's, is not replaced: it gets another name.
+Status put_damaged_aside(const fs::path& file) {
+  std::error_code failed;
+  if (!fs::exists(file, failed) || scene::with_drawn_lines(file, {}, {})) return {};
+  const fs::path aside = file.parent_path() / (file.stem().string() + "-damaged" + file.extension().string());
+  fs::rename(file, aside, failed);
+  return failed ? error("{}: could not be renamed: {}.", file.string(), failed.message()) : Status();
+}
+
 // The JSON text of a look; empty: there is no such look.
 std::string json_of(const std::vector<scene::Look>& looks, const std::string& name) {
   for (const scene::Look& look : looks)
@@ -63,6 +74,14 @@ scene::ShowState ShowStore::loaded(const scene::Scene& scene, scene::ShowState s
     else
       log_warning("live: {} This look is not used; its file was not changed.", look.message());
   }
+  const fs::path drawn = scene::kept_file(scene.folder, scene::k_drawn_lines_file);
+  if (std::error_code none; fs::exists(drawn, none)) {
+    auto with_lines = scene::with_drawn_lines(drawn, scene, show_state);
+    if (with_lines)
+      show_state = std::move(*with_lines);
+    else
+      log_warning("live: {} The drawn lines are not used.", with_lines.message());
+  }
   const fs::path file = scene::kept_file(scene.folder, k_pairings);
   if (std::error_code none; !fs::exists(file, none)) return show_state;
   auto paired = scene::with_pairings(file, scene, show_state);
@@ -79,6 +98,7 @@ void ShowStore::keep(const scene::Scene& scene,
                      const std::function<cv::Mat()>& look_image) {
   if (!writer_) return;
   keep_pairings(scene, before, after);
+  keep_drawn(scene, before, after);
   if (const auto* unit = std::get_if<scene::PartUnit>(&command.value))
     keep_unit(scene, scene.slots[command.slot], *unit);
   keep_looks(scene::kept_folder(scene.folder) / "looks", before, after, look_image);
@@ -94,6 +114,31 @@ void ShowStore::keep_pairings(const scene::Scene& scene,
     if (!text.empty()) return write_file(file, text);
     std::error_code ignored;
     fs::remove(file, ignored);
+    return {};
+  });
+}
+
+void ShowStore::keep_drawn(const scene::Scene& scene,
+                           const scene::ShowState& before,
+                           const scene::ShowState& after) {
+  if (before.drawn == after.drawn && (after.drawn.empty() || before.lines == after.lines)) return;
+  waiting_ = Drawn{scene::kept_folder(scene.folder) / scene::k_drawn_lines_file, after.drawn, after.lines};
+  keep_waiting();
+}
+
+void ShowStore::keep_waiting() {
+  if (waiting_ && std::chrono::steady_clock::now() - drawn_written_at_ >= k_between_drawn) write_drawn();
+}
+
+void ShowStore::write_drawn() {
+  drawn_written_at_ = std::chrono::steady_clock::now();
+  writer_->add([drawn = *std::exchange(waiting_, std::nullopt)]() -> Status {
+    const std::string text = scene::drawn_lines_json(drawn.lines, drawn.shown);
+    LIMN_TRY_STATUS(make_folder(drawn.file.parent_path()));
+    LIMN_TRY_STATUS(put_damaged_aside(drawn.file));
+    if (!text.empty()) return write_file(drawn.file, text);
+    std::error_code ignored;
+    fs::remove(drawn.file, ignored);
     return {};
   });
 }
@@ -133,6 +178,7 @@ void ShowStore::keep_looks(const fs::path& folder,
 }
 
 void ShowStore::finish() {
+  if (writer_ && waiting_) write_drawn();
   if (writer_) writer_->finish();
 }
 

@@ -11,6 +11,7 @@
 #include "core/file.h"
 #include "core/file_writer.h"
 #include "core/image_io.h"
+#include "scene/kept_files.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
 #include "tests/support/matchers.h"
@@ -152,6 +153,49 @@ TEST(ShowStore, WritesNothingWhereItOnlyReads) {
              [] { return cv::Mat(); });
   store.finish();
   EXPECT_FALSE(fs::exists(scene.folder / "looks"));
+}
+
+// A stroke comes in many edits; the file has all of it, and the next session begins with it.
+TEST(ShowStore, DrawnLinesAreThereInTheNextSession) {
+  const fs::path folder = test::test_folder(), file = folder / "door" / scene::k_drawn_lines_file;
+  const scene::Scene scene = door_in(folder);
+  scene::ShowState now = scene::initial_show_state(scene);
+  const auto keep = [&](ShowStore* store, const scene::Edit& edit) {
+    const scene::ShowState before = now;
+    now = edited(scene, before, edit);
+    store->keep(scene, before, now, scene::command_of(scene, edit).value(), [] { return cv::Mat(); });
+  };
+  const auto next = [&] { return ShowStore::loaded(scene, scene::initial_show_state(scene)); };
+  {
+    ShowStore store(true);
+    for (int i = 0; i < 50; ++i)
+      keep(&store, {"draw_line", "sill", fmt::format("points {} 20 30 {} 20 30", 2 * i, 2 * i + 2)});
+    store.finish();
+    EXPECT_TRUE(fs::exists(file)) << "also before the session ends";
+    keep(&store, {"draw_line", "trim", "points 0 0 30 30 0 30"});
+    keep(&store, {"line", "trim", "off"});
+  }
+  scene::ShowState again = next();
+  ASSERT_EQ(again.drawn.size(), 2u);
+  ASSERT_EQ(again.drawn[0].curve.points.size(), now.drawn[0].curve.points.size());
+  for (std::size_t i = 0; i < now.drawn[0].curve.points.size(); ++i)
+    EXPECT_LT((again.drawn[0].curve.points[i].p - now.drawn[0].curve.points[i].p).norm(), 2e-6);  // 0.001 mm
+  EXPECT_EQ(again.lines, (std::vector<std::string>{"sill"}));
+  // What is damaged is reported, not used, and not lost.
+  const std::string whole = read_file(file).value();
+  ASSERT_TRUE(write_file(file, whole.substr(0, whole.size() / 2)));
+  EXPECT_TRUE(next().drawn.empty());
+  {
+    ShowStore store(true);
+    keep(&store, {"erase_line", "trim", ""});
+  }
+  EXPECT_EQ(read_file(folder / "door/drawn-damaged.json").value(), whole.substr(0, whole.size() / 2));
+  EXPECT_EQ(next().drawn.size(), 1u);
+  {
+    ShowStore store(true);
+    keep(&store, {"erase_line", "sill", ""});
+  }
+  EXPECT_FALSE(fs::exists(file));
 }
 
 }  // namespace

@@ -116,6 +116,7 @@ TEST(CleanFolder, TakesPrivateWordsOutOfAllFilesAndRemovesWhatIsNotNeeded) {
                                           {"scene/door.glb", "samantha"},
                                           {"scene/comments.json", "{}"},
                                           {"scene/pairings.json", "{}"},
+                                          {"scene/drawn.json", "{}"},
                                           {"scene/looks/a.json", "{}"},
                                           {"authority.pem", "key"}})
     ASSERT_TRUE(write_file(folder / file, text));
@@ -127,8 +128,8 @@ TEST(CleanFolder, TakesPrivateWordsOutOfAllFilesAndRemovesWhatIsNotNeeded) {
   EXPECT_EQ(read_file(folder / "poses.csv").value(), "at_s,who\n1234567.5,(user)\n");
   EXPECT_EQ(read_file(folder / "session.html").value(), "<p>(user)</p>");
   EXPECT_EQ(read_file(folder / "scene/scene.json").value(), "// by (user)\n{}\n");
-  for (const char* file :
-       {"scene/comments.json", "scene/pairings.json", "scene/looks", "authority.pem", "link.json"})
+  for (const char* file : {"scene/comments.json", "scene/pairings.json", "scene/drawn.json", "scene/looks",
+                           "authority.pem", "link.json"})
     EXPECT_FALSE(fs::exists(fs::symlink_status(folder / file))) << file;
   EXPECT_TRUE(fs::exists(folder / "scene/door.glb"));
 }

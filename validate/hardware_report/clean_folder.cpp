@@ -37,7 +37,7 @@ std::string lower_extension(const fs::path& path) {
 }
 
 bool is_unneeded(const fs::path& path) {
-  static const std::set<std::string> k_names = {"comments.json", "pairings.json", "looks"};
+  static const std::set<std::string> k_names = {"comments.json", "pairings.json", "drawn.json", "looks"};
   static const std::set<std::string> k_kinds = {".pem", ".key", ".crt", ".cer", ".p12", ".pfx"};
   std::error_code none;
   return fs::is_symlink(path, none) || k_names.contains(path.filename().string()) ||
