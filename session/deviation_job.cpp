@@ -78,11 +78,28 @@ std::string sentence(const PrototypeComparison& compared, const std::string& mov
   return text;
 }
 
+// The images of a scan on the disk, as long as they are needed.
+class ImageFolder {
+ public:
+  ImageFolder() = default;
+  explicit ImageFolder(fs::path folder) : folder_(std::move(folder)) {}
+  ImageFolder(ImageFolder&& other) noexcept : folder_(std::exchange(other.folder_, {})) {}
+  ImageFolder& operator=(ImageFolder&&) = delete;
+  ~ImageFolder() {
+    std::error_code ignored;
+    if (!folder_.empty()) fs::remove_all(folder_, ignored);
+  }
+
+ private:
+  fs::path folder_;
+};
+
 // A comparison that is applied when it is computed.
 class ComparisonJob : public CaptureJob {
  public:
   using Task = CaptureTask<Compared>;
-  ComparisonJob(int scenes, std::unique_ptr<Task> task) : scenes_(scenes), task_(std::move(task)) {}
+  ComparisonJob(int scenes, std::unique_ptr<Task> task, ImageFolder images = {})
+      : images_(std::move(images)), scenes_(scenes), task_(std::move(task)) {}
 
   CapturePort& port() override { return task_->port(); }
   bool is_computed() const override { return task_->is_done(); }
@@ -118,14 +135,15 @@ class ComparisonJob : public CaptureJob {
     return {};
   }
 
+  ImageFolder images_;  // first: it goes when the task, which writes into it, has gone
   int scenes_;
   std::unique_ptr<Task> task_;
 };
 
 class ScanJob final : public ComparisonJob {
  public:
-  ScanJob(int scenes, std::unique_ptr<Task> task, std::vector<Track> before)
-      : ComparisonJob(scenes, std::move(task)), before_(std::move(before)) {}
+  ScanJob(int scenes, std::unique_ptr<Task> task, ImageFolder images, std::vector<Track> before)
+      : ComparisonJob(scenes, std::move(task), std::move(images)), before_(std::move(before)) {}
 
   bool is_ready(const Session& session, Stamp now) override {
     if (!ended_at_) ended_at_ = std::max(now, session.percepts().captured_at);
@@ -190,6 +208,7 @@ Result<std::unique_ptr<CaptureJob>> scan_job(
     const fs::path& folder,
     const std::function<wizard::WizardBackend(ImageWriter*)>& backend,
     Stamp) {
+  ImageFolder images(folder);
   const std::vector<Track>& before = session.prediction().at_capture;
   const Track* prototype = tracked(before, "prototype");
   if (!session.setup().scene.prototype || !prototype)
@@ -207,7 +226,8 @@ Result<std::unique_ptr<CaptureJob>> scan_job(
     return std::make_shared<const PrototypeComparison>(std::move(compared));
   };
   auto task = std::make_unique<ComparisonJob::Task>(scan_images(rig), backend, std::move(work));
-  return std::unique_ptr<CaptureJob>(std::make_unique<ScanJob>(session.scenes(), std::move(task), before));
+  return std::unique_ptr<CaptureJob>(
+      std::make_unique<ScanJob>(session.scenes(), std::move(task), std::move(images), before));
 }
 
 Result<std::unique_ptr<CaptureJob>> comparison_job(const Session& session) {

@@ -14,7 +14,8 @@ namespace limn::session {
 // result stays. A result is dropped when the scene or the rig has changed meanwhile.
 
 /// Scans the prototype where it is tracked, and compares it. Perception must be paused. The result counts
-/// only if the prototype is still there after the capture. Error: the prototype is not tracked now.
+/// only if the prototype is still there after the capture. `folder` is removed with the job, or with its
+/// error. Error: the prototype is not tracked now.
 Result<std::unique_ptr<CaptureJob>> scan_job(
     const Session& session,
     const std::filesystem::path& folder,

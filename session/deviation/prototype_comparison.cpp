@@ -25,15 +25,6 @@ constexpr double k_start_reach_m = 0.015;
 // With inverse patterns: the standard deviations then say how large the errors are.
 constexpr auto k_code = calib::PatternCode::gray;
 
-// Images on the disk while they are needed.
-struct CaptureFolder {
-  fs::path path;
-  ~CaptureFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-};
-
 std::vector<calib::CapturedDevice> devices(const std::vector<Imager>& imagers) {
   std::vector<calib::CapturedDevice> list;
   for (const Imager& imager : imagers)
@@ -121,7 +112,6 @@ Result<ScannedPrototype> scanned_in_place(const Rig& rig,
                                           const ShouldContinue& should_continue) {
   LIMN_TRY_STATUS(check_rig(rig));
   LIMN_TRY(const calib::Board board, wizard::calibration_board(rig));
-  const CaptureFolder images{folder};
   LIMN_TRY_STATUS(wizard::capture_once(
       calib::plan_captures(folder, devices(rig.cameras), devices(rig.projectors), board, k_code), rig,
       backend));

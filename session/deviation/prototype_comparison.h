@@ -49,7 +49,7 @@ struct PrototypeComparison {
 using ShouldContinue = std::function<bool()>;
 
 /// Scans whatever stands at `world_from_tracked` with patterns of all projectors: captures into `folder`,
-/// which is removed again; measures the surface within the surroundings of the CAD. The devices of `backend`
+/// which the caller removes; measures the surface within the surroundings of the CAD. The devices of `backend`
 /// have the rig's names and order; only capture, wait_for_files and use_latency are needed. Errors: no camera
 /// for visible light, a device that fails, nothing measured, a prototype that moved; `should_continue`, which
 /// is called from time to time, returns false.
