@@ -8,6 +8,7 @@
 
 #include "calib/capture.h"
 #include "calib/surface/scan.h"
+#include "calib/surface/scan_overlap.h"
 #include "core/stopwatch.h"
 #include "session/deviation/comparison_layer.h"
 #include "wizard/capture/rig_recheck.h"
