@@ -1,5 +1,6 @@
 // Parts that a plane cuts open: caps without holes on random planes, judged by solid angles; and agreement
 // with the ray tracer.
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -34,7 +35,55 @@ double windings(const Mesh& mesh, const Vector3d& p) {
   return sum / (4 * std::numbers::pi);
 }
 
-bool is_inside(const Mesh& mesh, const Vector3d& p) { return std::abs(windings(mesh, p)) > 0.5; }
+// Where a plane crosses a closed mesh: directed sides of outlines on the plane, whose winding number is the
+// mesh's. It decides in a hundredth of the time of solid angles, which judge where a picture disagrees.
+// A corner on the plane counts as above it everywhere, so that the outlines close.
+class CrossSection {
+ public:
+  CrossSection(const Mesh& mesh, const CutPlane& plane)
+      : d_x_(plane.normal.unitOrthogonal()), d_y_(plane.normal.cross(d_x_)) {
+    for (const auto& triangle : mesh.triangles) {
+      std::array<Vector3d, 3> p;
+      std::array<double, 3> height;
+      for (std::size_t i = 0; i < 3; ++i) {
+        p[i] = mesh.positions[triangle[i]].cast<double>();
+        height[i] = height_over(plane, p[i]);
+      }
+      Side side;
+      int crossings = 0;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::size_t next = (i + 1) % 3;
+        if ((height[i] >= 0) == (height[next] >= 0)) continue;
+        const std::size_t above = height[i] >= 0 ? i : next, below = height[i] >= 0 ? next : i;
+        const Vector3d at =
+            p[above] + height[above] / (height[above] - height[below]) * (p[below] - p[above]);
+        (above == i ? side.from : side.to) = {d_x_.dot(at), d_y_.dot(at)};
+        ++crossings;
+      }
+      if (crossings == 2) sides_.push_back(side);
+    }
+  }
+
+  // Whether the outlines wind around a point of the plane.
+  bool is_inside(const Vector3d& p) const {
+    const Eigen::Vector2d at(d_x_.dot(p), d_y_.dot(p));
+    int windings = 0;
+    for (const Side& side : sides_) {
+      if ((side.from.y() > at.y()) == (side.to.y() > at.y())) continue;
+      const double share = (at.y() - side.from.y()) / (side.to.y() - side.from.y());
+      if (side.from.x() + share * (side.to.x() - side.from.x()) > at.x())
+        windings += side.to.y() > side.from.y() ? 1 : -1;
+    }
+    return windings != 0;
+  }
+
+ private:
+  struct Side {
+    Eigen::Vector2d from = {0, 0}, to = {0, 0};
+  };
+  Vector3d d_x_, d_y_;
+  std::vector<Side> sides_;
+};
 
 Eigen::AlignedBox3d box_of(const Mesh& mesh) {
   Eigen::AlignedBox3d box;
@@ -83,8 +132,8 @@ std::optional<Vector3d> on_plane(const Imager& viewer, const CutPlane& plane, do
   return world_from_viewer.translation + t * d;
 }
 
-// Whether what lies within `px` pixels of a pixel on the plane, and just below and above the plane there, is all
-// inside the mesh (1), all outside (-1), or both (0). On a face in the plane neither answer is wrong.
+// Whether what lies within `px` pixels of a pixel on the plane, and just below and above the plane there, is
+// all inside the mesh (1), all outside (-1), or both (0). On a face in the plane neither answer is wrong.
 int around(const Mesh& mesh, const Imager& viewer, const CutPlane& plane, double x, double y, double px) {
   int inside = 0;
   for (int i = 0; i < 25; ++i) {
@@ -146,6 +195,7 @@ bool is_cap_colour(const cv::Vec3b& bgr) { return bgr[1] < 8 && bgr[0] > 150 && 
 Mistakes judged(
     const cv::Mat& drawn, const Mesh& mesh, const Imager& viewer, const CutPlane& plane, int step) {
   Mistakes out;
+  const CrossSection section(mesh, plane);
   cv::Mat1b caps(drawn.size()), smooth;
   for (int row = 0; row < drawn.rows; ++row)
     for (int column = 0; column < drawn.cols; ++column)
@@ -156,18 +206,18 @@ Mistakes judged(
       const bool is_cap = caps(row, column) != 0, is_odd = is_cap != (smooth(row, column) != 0);
       if (!is_odd && (row % step != 0 || column % step != 0)) continue;
       const auto p = on_plane(viewer, plane, column, row);
-      const bool wanted = p && is_inside(mesh, *p);
+      const bool wanted = p && section.is_inside(*p);
       ++out.pixels;
       out.caps += wanted;
-      if (wanted == is_cap || around(mesh, viewer, plane, column, row, 1.5) != (wanted ? 1 : -1)) continue;
-      (wanted ? out.holes : out.outside) += 1;
+      if (wanted == is_cap || around(mesh, viewer, plane, column, row, 1.5) != (is_cap ? -1 : 1)) continue;
+      (is_cap ? out.outside : out.holes) += 1;
     }
   return out;
 }
 
 TEST_F(SectionTest, CapsHaveNoHolesOnRandomPlanes) {
   std::mt19937_64 rng(20261128);
-  constexpr int k_planes = 24;  // of each part
+  constexpr int k_planes = 14;  // of each part; the ray tracer gets a thousand
   int planes = 0;
   Mistakes all;
   for (const auto& [name, mesh] : closed_parts_of_the_demo()) {
@@ -177,9 +227,9 @@ TEST_F(SectionTest, CapsHaveNoHolesOnRandomPlanes) {
     const int count = name == "door" ? k_planes / 3 : k_planes;
     for (int i = 0; i < count; ++i) {
       posed.cut = random_plane(mesh, i, rng);
-      const Imager viewer = viewer_of_plane(mesh, *posed.cut, 400, 300, rng);
+      const Imager viewer = viewer_of_plane(mesh, *posed.cut, 320, 240, rng);
       const cv::Mat drawn = drawing.view(viewer, posed, cv::Scalar::all(0));
-      const Mistakes found = judged(drawn, mesh, viewer, *posed.cut, name == "door" ? 40 : 16);
+      const Mistakes found = judged(drawn, mesh, viewer, *posed.cut, name == "door" ? 32 : 10);
       EXPECT_EQ(found.holes, 0) << name << ", plane " << i;
       EXPECT_EQ(found.outside, 0) << name << ", plane " << i;
       all.caps += found.caps;
@@ -206,6 +256,7 @@ TEST_F(SectionTest, TheRayTracersCapsHaveNoHolesOnAThousandPlanes) {
     const int count = name == "door" ? 40 : 320;
     for (int i = 0; i < count; ++i, ++planes) {
       posed.cut = random_plane(mesh, i, rng);
+      const CrossSection section(mesh, *posed.cut);
       const Imager viewer = viewer_of_plane(mesh, *posed.cut, 12, 9, rng);
       const sim::PartImage drawn = sim::ReferenceRenderer(world, posed, viewer).parts_image(viewer);
       for (int row = 0; row < drawn.cover.rows; ++row)
@@ -215,11 +266,11 @@ TEST_F(SectionTest, TheRayTracersCapsHaveNoHolesOnAThousandPlanes) {
           const bool is_none = light[0] == 0;
           if (!is_cap && !is_none) continue;  // a pixel on an edge
           const auto p = on_plane(viewer, *posed.cut, column, row);
-          const bool wanted = p && is_inside(mesh, *p);
+          const bool wanted = p && section.is_inside(*p);
           caps += wanted;
-          if (wanted == is_cap || around(mesh, viewer, *posed.cut, column, row, 0.2) != (wanted ? 1 : -1))
+          if (wanted == is_cap || around(mesh, viewer, *posed.cut, column, row, 0.2) != (is_cap ? -1 : 1))
             continue;
-          ADD_FAILURE() << name << ", plane " << i << ": " << (wanted ? "a hole" : "a cap outside");
+          ADD_FAILURE() << name << ", plane " << i << ": " << (is_cap ? "a cap outside" : "a hole");
           return;
         }
     }
