@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
+#include <opencv2/imgcodecs.hpp>
 
 #include "core/file.h"
 #include "scene/volumes/volume_name.h"
@@ -169,6 +170,9 @@ TEST(Nifti, DamagedAndForeignFilesAreOneMessageEach) {
   NiftiFile file = numbered();
   file.values.resize(20);
   EXPECT_THAT(nifti_error(file), HasSubstr("ends before"));
+  std::string late = numbered().bytes();
+  numbered().put(&late, 108, 1e9F);
+  EXPECT_THAT(load_volume(written("late.nii", late)).message(), HasSubstr("within the first 64 MiB"));
   const std::string whole = packed(numbered().bytes());
   EXPECT_FALSE(load_volume(written("cut.nii.gz", whole.substr(0, whole.size() - 30))));
   EXPECT_THAT(load_volume(written("short.nii", "hello")).message(), HasSubstr("ends within its header"));
@@ -348,6 +352,178 @@ TEST(Dicom, SlicesInRleAreDecoded) {
   EXPECT_THAT(dicom_error(files), HasSubstr("JPEG 2000"));
 }
 
+// A slice's values of 16 bits as lossless JPEG (ITU-T T.81, annex H): each is predicted by the one before it.
+std::string lossless_jpeg(const std::vector<int>& values, int columns, int rows) {
+  const auto number = [](int n) {
+    return std::string{static_cast<char>(n >> 8), static_cast<char>(n & 0xff)};
+  };
+  std::string out = "\xff\xd8\xff\xc3" + number(11) + '\x10' + number(rows) + number(columns) +
+                    std::string("\x01\x01\x11\x00", 4);
+  // 17 codes of 5 bits, for the number of bits of a difference.
+  out += "\xff\xc4" + number(2 + 17 + 17) + std::string("\0\0\0\0\0\x11", 6) + std::string(11, '\0');
+  for (int i = 0; i <= 16; ++i) out += static_cast<char>(i);
+  out += "\xff\xda" + number(8) + std::string("\x01\x01\x00\x01\x00\x00", 6);
+  std::uint32_t word = 0;
+  int used = 0;
+  const auto add_bits = [&](int value, int count) {
+    for (int i = count - 1; i >= 0; --i) {
+      word = word << 1 | (static_cast<std::uint32_t>(value) >> i & 1U);
+      if (++used < 8) continue;
+      out += static_cast<char>(word & 0xff);
+      if ((word & 0xff) == 0xff) out += '\0';
+      used = 0;
+    }
+  };
+  for (int i = 0; i < columns * rows; ++i) {
+    const int before =
+        i == 0 ? 32768 : values[static_cast<std::size_t>(i % columns == 0 ? i - columns : i - 1)];
+    const int difference = values[static_cast<std::size_t>(i)] - before;
+    int bits = 0;
+    while (std::abs(difference) >> bits != 0) ++bits;
+    add_bits(bits, 5);
+    add_bits(difference < 0 ? difference - 1 : difference, bits);
+  }
+  while (used != 0) add_bits(1, 1);
+  return out + "\xff\xd9";
+}
+
+std::vector<int> numbered_values(int k) {
+  std::vector<int> values;
+  for (int j = 0; j < 3; ++j)
+    for (int i = 0; i < 4; ++i) values.push_back(1000 * k + 10 * j + i);
+  return values;
+}
+
+TEST(Dicom, SlicesInLosslessJpegAreDecoded) {
+  std::vector<DicomFile> files;
+  for (int k = 0; k < 3; ++k) {
+    files.push_back(axial(k));
+    files.back().transfer_syntax = "1.2.840.10008.1.2.4.70";
+    files.back().pixels = lossless_jpeg(numbered_values(k), 4, 3);
+    files.back().is_encoded = true;
+  }
+  const auto volume = load_volume(folder_of(files));
+  ASSERT_TRUE(volume) << volume.message();
+  EXPECT_EQ(value_at(*volume, 0, 0, 0), 0);
+  EXPECT_EQ(value_at(*volume, 3, 2, 2), 2023);
+  EXPECT_EQ(value_at(*volume, 0, 1, 1), 1010);
+}
+
+TEST(Dicom, SlicesInBaselineJpegAreDecoded) {
+  std::vector<DicomFile> files;
+  cv::Mat1b image(24, 32);
+  for (int j = 0; j < image.rows; ++j)
+    for (int i = 0; i < image.cols; ++i) image(j, i) = static_cast<std::uint8_t>(3 * i + 5 * j);
+  std::vector<std::uint8_t> jpeg;
+  ASSERT_TRUE(cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, 98}));
+  for (int k = 0; k < 2; ++k) {
+    files.push_back(axial(k));
+    DicomFile& file = files.back();
+    file.columns = image.cols;
+    file.rows = image.rows;
+    file.allocated = file.stored = 8;
+    file.high = 7;
+    file.transfer_syntax = "1.2.840.10008.1.2.4.50";
+    file.pixels.assign(jpeg.begin(), jpeg.end());
+    file.is_encoded = true;
+  }
+  const auto volume = load_volume(folder_of(files));
+  ASSERT_TRUE(volume) << volume.message();
+  double worst = 0;
+  for (int j = 0; j < image.rows; ++j)
+    for (int i = 0; i < image.cols; ++i)
+      worst = std::max(worst, std::abs(value_at(*volume, i, j, 1) - static_cast<double>(image(j, i))));
+  EXPECT_LE(worst, 3);
+}
+
+TEST(Dicom, AJpegImageOfAnotherSizeThanItsSliceIsAnError) {
+  std::vector<DicomFile> files = {axial(0), axial(1)};
+  for (DicomFile& file : files) {
+    file.transfer_syntax = "1.2.840.10008.1.2.4.70";
+    file.pixels = lossless_jpeg(numbered_values(1), 4, 3);
+    file.pixels.replace(7, 4, "\xff\xdc\xff\xdc");  // 65500 x 65500: 8 GiB in a decoder
+    file.is_encoded = true;
+  }
+  EXPECT_THAT(dicom_error(files), HasSubstr("JPEG image of 4 x 3 grey values, found 65500 x 65500"));
+  for (DicomFile& file : files) file.pixels.resize(5);
+  EXPECT_THAT(dicom_error(files), HasSubstr("JPEG image of 4 x 3 grey values, found another"));
+}
+
+// An enhanced file of four coronal frames in the order 2, 0, 3, 1.
+DicomFile enhanced() {
+  DicomFile file = slice(0, "");
+  file.pixels.clear();
+  for (const int k : {2, 0, 3, 1}) {
+    file.frame_positions.push_back(fmt::format("-5\\{}\\7", 1.5 * k));
+    for (const int value : numbered_values(k)) file.add_value(value);
+  }
+  file.orientation = "1\\0\\0\\0\\0\\-1";
+  file.spacing = "0.75\\0.5";
+  file.slope = "2";
+  file.intercept = "-10";
+  file.window_centre = "40";
+  file.window_width = "400";
+  return file;
+}
+
+void expect_enhanced(const std::vector<DicomFile>& files) {
+  const auto volume = load_volume(folder_of(files));
+  ASSERT_TRUE(volume) << volume.message();
+  EXPECT_THAT(volume->size, ::testing::ElementsAre(4, 3, 4));
+  for (int k = 0; k < 4; ++k) EXPECT_EQ(value_at(*volume, 3, 2, k), 2 * (1000 * k + 23) - 10) << k;
+  // LPS (-5 + 0.5 i, 1.5 k, 7 - 0.75 j)
+  EXPECT_LT((ras_mm(*volume, 3, 2, 2) - Eigen::Vector3d(3.5, -3, 5.5)).norm(), k_near_mm);
+  EXPECT_EQ(volume->window.level, 40);
+  EXPECT_EQ(volume->window.width, 400);
+}
+
+TEST(Dicom, FramesOfAnEnhancedFileLieInTheirOrder) {
+  for (const bool is_explicit : {true, false}) {
+    DicomFile file = enhanced();
+    file.is_explicit = is_explicit;
+    expect_enhanced({file});
+  }
+  DicomFile packed = enhanced();
+  packed.transfer_syntax = "1.2.840.10008.1.2.4.70";
+  packed.is_encoded = true;
+  for (const int k : {2, 0, 3, 1}) packed.fragments.push_back(lossless_jpeg(numbered_values(k), 4, 3));
+  expect_enhanced({packed});
+}
+
+TEST(Dicom, EnhancedFilesThatDoNotFitAreErrors) {
+  DicomFile file = enhanced();
+  file.frame_positions[1] = file.frame_positions[0];
+  EXPECT_THAT(dicom_error({file}), HasSubstr("(frame 1) and IM00 (frame 2) at the same"));
+  file = enhanced();
+  file.frame_positions[3] = "";
+  EXPECT_THAT(dicom_error({file}), HasSubstr("frame 4: expected a slice with its place"));
+  file = enhanced();
+  file.pixels.resize(80);
+  EXPECT_THAT(dicom_error({file}), HasSubstr("expected 12 values for each slice, found fewer"));
+  file.frame_positions.assign(2049, "0\\0\\0");
+  EXPECT_THAT(dicom_error({file}), HasSubstr("at most 2048 slices in a file, found 2049"));
+}
+
+TEST(Dicom, FilesThatWouldFillTheMemoryAreErrors) {
+  DicomFile file = axial(1);
+  file.transfer_syntax = "1.2.840.10008.1.2.1.99";
+  EXPECT_THAT(dicom_error({axial(0), file}), HasSubstr("deflated"));
+  file = axial(1);
+  // Sequences within sequences, which the library reads by functions that call themselves.
+  const std::string open = std::string("\x40\x00\x30\xa7SQ\0\0", 8) + DicomFile::number32(0xffffffff) +
+                           std::string("\xfe\xff\x00\xe0", 4) + DicomFile::number32(0xffffffff);
+  std::string nested;
+  for (int i = 0; i < 300000; ++i) nested += open;
+  const fs::path folder = folder_of({axial(0)});
+  written("series/nested", file.bytes() + nested);
+  EXPECT_THAT(load_volume(folder).message(), HasSubstr("nested: expected a complete DICOM file"));
+  // Empty elements, each of which costs the library some hundred bytes.
+  std::string many;
+  for (int i = 0; i < 2200000; ++i) many += std::string("\x09\x00\x01\x10UN\0\0\0\0\0\0", 12);
+  written("series/nested", file.bytes() + many);
+  EXPECT_THAT(load_volume(folder).message(), HasSubstr("nested: expected a complete DICOM file"));
+}
+
 TEST(Dicom, MixedSeriesAreListedWithTheirSlices) {
   std::vector<DicomFile> files;
   for (int k = 0; k < 5; ++k) files.push_back(axial(k));
@@ -396,7 +572,7 @@ TEST(Dicom, SlicesThatDoNotFitAreErrors) {
   EXPECT_THAT(dicom_error({axial(0), other}), HasSubstr("'RGB'"));
   other = axial(1);
   other.frames = "12";
-  EXPECT_THAT(dicom_error({axial(0), other}), HasSubstr("enhanced DICOM"));
+  EXPECT_THAT(dicom_error({axial(0), other}), HasSubstr("place of each of its 12 frames"));
   EXPECT_THAT(dicom_error({axial(0)}), HasSubstr("single slice"));
 }
 

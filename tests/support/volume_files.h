@@ -75,6 +75,10 @@ struct DicomFile {
   std::string transfer_syntax = {};  ///< Empty: by is_explicit.
   std::string pixels;                ///< Native, little endian; or one encoded fragment where `is_encoded`.
   bool is_encoded = false;
+  /// Positions of the frames of an enhanced file, in which functional groups take the place of the members
+  /// position, orientation, spacing, window and rescale; `pixels` are those of all frames.
+  std::vector<std::string> frame_positions = {};
+  std::vector<std::string> fragments = {};  ///< Encoded fragments instead of `pixels`.
 
   std::string bytes() const {
     std::string meta;
@@ -95,26 +99,34 @@ struct DicomFile {
     put(0x0008, 0x103e, "LO", description);
     put(0x0020, 0x000e, "UI", series);
     put(0x0020, 0x0011, "IS", number);
-    put(0x0020, 0x0032, "DS", position);
-    put(0x0020, 0x0037, "DS", orientation);
+    const bool is_enhanced = !frame_positions.empty();
+    const auto put_beside = [&](int group, int element, const std::string& value) {
+      if (!is_enhanced) put(group, element, "DS", value);
+    };
+    put_beside(0x0020, 0x0032, position);
+    put_beside(0x0020, 0x0037, orientation);
     put(0x0028, 0x0002, "US", number16(photometric == "RGB" ? 3 : 1));
     put(0x0028, 0x0004, "CS", photometric);
-    put(0x0028, 0x0008, "IS", frames);
+    put(0x0028, 0x0008, "IS", is_enhanced ? std::to_string(frame_positions.size()) : frames);
     put(0x0028, 0x0010, "US", number16(rows));
     put(0x0028, 0x0011, "US", number16(columns));
-    put(0x0028, 0x0030, "DS", spacing);
+    put_beside(0x0028, 0x0030, spacing);
     put(0x0028, 0x0100, "US", number16(allocated));
     put(0x0028, 0x0101, "US", number16(stored));
     put(0x0028, 0x0102, "US", number16(high));
     put(0x0028, 0x0103, "US", number16(is_signed ? 1 : 0));
-    put(0x0028, 0x1050, "DS", window_centre);
-    put(0x0028, 0x1051, "DS", window_width);
-    put(0x0028, 0x1052, "DS", intercept);
-    put(0x0028, 0x1053, "DS", slope);
-    if (is_encoded)
-      data += number16(0x7fe0) + number16(0x0010) + "OB" + number16(0) + number32(0xffffffff) +
-              item(0xe000, "") + item(0xe000, pixels) + number16(0xfffe) + number16(0xe0dd) + number32(0);
-    else
+    put_beside(0x0028, 0x1050, window_centre);
+    put_beside(0x0028, 0x1051, window_width);
+    put_beside(0x0028, 0x1052, intercept);
+    put_beside(0x0028, 0x1053, slope);
+    if (is_enhanced) data += functional_groups();
+    if (is_encoded) {
+      data +=
+          number16(0x7fe0) + number16(0x0010) + "OB" + number16(0) + number32(0xffffffff) + item(0xe000, "");
+      for (const std::string& each : fragments.empty() ? std::vector{pixels} : fragments)
+        data += item(0xe000, each);
+      data += number16(0xfffe) + number16(0xe0dd) + number32(0);
+    } else
       put(0x7fe0, 0x0010, allocated == 8 && is_explicit ? "OB" : "OW", pixels);
     std::string file(128, '\0');
     file.append("DICM").append(length).append(meta).append(data);
@@ -133,6 +145,32 @@ struct DicomFile {
   }
 
  private:
+  // A sequence of items.
+  std::string sequence(int group, int element, const std::vector<std::string>& items) const {
+    std::string value, out;
+    for (const std::string& each : items) value += item(0xe000, each);
+    add(&out, is_explicit, group, element, "SQ", value);
+    return out;
+  }
+  std::string functional_groups() const {
+    const auto texts = [&](std::vector<std::pair<std::array<int, 2>, std::string>> elements) {
+      std::string out;
+      for (const auto& [tag, value] : elements)
+        if (!value.empty()) add(&out, is_explicit, tag[0], tag[1], "DS", value);
+      return out;
+    };
+    const std::string shared =
+        sequence(0x0020, 0x9116, {texts({{{0x0020, 0x0037}, orientation}})}) +
+        sequence(0x0028, 0x9110, {texts({{{0x0028, 0x0030}, spacing}})}) +
+        sequence(0x0028, 0x9132,
+                 {texts({{{0x0028, 0x1050}, window_centre}, {{0x0028, 0x1051}, window_width}})}) +
+        sequence(0x0028, 0x9145, {texts({{{0x0028, 0x1052}, intercept}, {{0x0028, 0x1053}, slope}})});
+    std::vector<std::string> of_frames;
+    for (const std::string& each : frame_positions)
+      of_frames.push_back(sequence(0x0020, 0x9113, {texts({{{0x0020, 0x0032}, each}})}));
+    return sequence(0x5200, 0x9229, {shared}) + sequence(0x5200, 0x9230, of_frames);
+  }
+
   static std::string even(std::string value, char fill) {
     if (value.size() % 2 == 1) value += fill;
     return value;
@@ -148,7 +186,7 @@ struct DicomFile {
     *to += number16(group) + number16(element);
     if (!is_explicit)
       *to += number32(static_cast<std::uint32_t>(value.size()));
-    else if (vr == "OB" || vr == "OW")
+    else if (vr == "OB" || vr == "OW" || vr == "SQ")
       *to += vr + number16(0) + number32(static_cast<std::uint32_t>(value.size()));
     else
       *to += vr + number16(static_cast<int>(value.size()));

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 using Slices = std::vector<DicomSlice>;
 
-constexpr std::size_t k_most_files = 20000;  // in one folder; a series has at most some thousand
+constexpr std::size_t k_most_files = 20000;  // and slices in one folder; a series has at most some thousand
 
 // Error: slices of several series.
 Status check_one_series(const fs::path& folder, const Slices& slices) {
@@ -65,13 +65,13 @@ Status check_alike(const Slices& slices) {
     if (differs)
       return error(
           "{}: expected a slice like {}, found another {}. Remove slices that do not belong to the stack.",
-          as_utf8(slice.path.string()), as_utf8(first.path.filename().string()), differs);
+          as_utf8((slice.path.parent_path() / slice.name()).string()), first.name(), differs);
   }
   return {};
 }
 
 std::string between(const DicomSlice& a, const DicomSlice& b) {
-  return fmt::format("{} and {}", as_utf8(a.path.filename().string()), as_utf8(b.path.filename().string()));
+  return fmt::format("{} and {}", a.name(), b.name());
 }
 
 // The step from a slice to the next one, LPS mm, of slices in their order. Error: the slices are not at equal
@@ -90,8 +90,7 @@ Result<Eigen::Vector3d> step_of(const std::string& where, const Slices& slices) 
     if (steps[i] < k_same_place_mm)
       return error(
           "{}: expected each slice at a place of its own, found {} at the same. Several moments or echoes "
-          "must "
-          "be in folders of their own.",
+          "must be in folders of their own.",
           where, between(slices[i], slices[i + 1]));
   for (std::size_t i = 0; i < steps.size(); ++i)
     if (const double missing = std::round(steps[i] / usual) - 1;
@@ -109,7 +108,7 @@ Result<Eigen::Vector3d> step_of(const std::string& where, const Slices& slices) 
           "{}: expected slices at equal distances along a line, found {} {:.3g} mm beside its place. "
           "Resample "
           "the series to equal distances.",
-          where, as_utf8(slices[i].path.filename().string()), off_mm);
+          where, slices[i].name(), off_mm);
   }
   return step;
 }
@@ -128,8 +127,11 @@ Result<Slices> sorted_slices(const fs::path& folder, std::vector<std::string>* w
       ++others;
       continue;
     }
-    LIMN_TRY(DicomSlice slice, read_dicom_slice(file));
-    slices.push_back(std::move(slice));
+    LIMN_TRY(Slices of_file, read_dicom_slices(file));
+    slices.insert(slices.end(), of_file.begin(), of_file.end());
+    if (slices.size() > k_most_files)
+      return error("{}: expected at most {} slices, found more. Give the folder of one series.", where,
+                   k_most_files);
   }
   if (slices.empty())
     return error(
@@ -145,6 +147,20 @@ Result<Slices> sorted_slices(const fs::path& folder, std::vector<std::string>* w
     return d_normal.dot(a.p_first_lps_mm) < d_normal.dot(b.p_first_lps_mm);
   });
   return slices;
+}
+
+// Reads the values of all slices, `in_slice` of each, in the slices' order. Each file is opened once.
+Status read_values(const Slices& slices, float* values, std::size_t in_slice) {
+  std::map<fs::path, std::vector<std::size_t>> by_file;
+  for (std::size_t i = 0; i < slices.size(); ++i) by_file[slices[i].path].push_back(i);
+  for (auto& [path, places] : by_file) {
+    std::ranges::sort(places, {}, [&](std::size_t i) { return slices[i].frame; });
+    LIMN_TRY(DicomValues file, DicomValues::open(path));
+    for (const std::size_t i : places) {
+      LIMN_TRY_STATUS(file.read(slices[i], values + i * in_slice));
+    }
+  }
+  return {};
 }
 
 }  // namespace
@@ -165,9 +181,7 @@ Result<Volume> read_dicom_folder(const fs::path& folder) {
                  static_cast<int>(slices.size())};
   const std::size_t in_slice = static_cast<std::size_t>(first.size[0] * first.size[1]);
   volume.values.resize(in_slice * slices.size());
-  for (std::size_t i = 0; i < slices.size(); ++i) {
-    LIMN_TRY_STATUS(read_dicom_values(slices[i], volume.values.data() + i * in_slice));
-  }
+  LIMN_TRY_STATUS(read_values(slices, volume.values.data(), in_slice));
   if (first.is_dark_high)
     volume.warnings.push_back(
         fmt::format("{}: high values are to be dark (MONOCHROME1); they are shown bright.", where));

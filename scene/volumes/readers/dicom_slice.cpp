@@ -2,102 +2,71 @@
 
 #include <dcmtk/config/osconfig.h>  // first: it describes the platform to the others
 #include <dcmtk/dcmdata/dcdeftag.h>
-#include <dcmtk/dcmdata/dcfilefo.h>
-#include <dcmtk/dcmdata/dcrledrg.h>
+#include <dcmtk/dcmdata/dcfcache.h>
+#include <dcmtk/dcmdata/dcpixel.h>
+#include <dcmtk/dcmdata/dcpixseq.h>
+#include <dcmtk/dcmdata/dcpxitem.h>
 #include <dcmtk/dcmdata/dcxfer.h>
-#include <dcmtk/dcmjpeg/djdecode.h>
-#include <dcmtk/dcmjpls/djdecode.h>
-#include <dcmtk/oflog/oflog.h>
 #include <fmt/format.h>
 
 #include <cmath>
 #include <cstdint>
-#include <memory>
-#include <mutex>
+#include <cstring>
 
 #include "core/utf8.h"
+#include "scene/volumes/readers/dicom_file.h"
+#include "scene/volumes/readers/jpeg_size.h"
 
 namespace limn::scene {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Prepares the library once: it is silent, and decodes compressed slices.
-void prepare_library() {
-  static std::once_flag once;
-  std::call_once(once, [] {
-    OFLog::configure(OFLogger::OFF_LOG_LEVEL);
-    DcmRLEDecoderRegistration::registerCodecs();
-    DJDecoderRegistration::registerCodecs();
-    DJLSDecoderRegistration::registerCodecs();
-  });
-}
-
-// A file's data set; long elements (the values) stay on the disk until they are asked for.
-Result<std::unique_ptr<DcmFileFormat>> open(const fs::path& path) {
-  prepare_library();
-  constexpr Uint32 k_most_read_at_once = 4096;  // bytes
-  auto file = std::make_unique<DcmFileFormat>();
-  const OFCondition read =
-      file->loadFile(path.c_str(), EXS_Unknown, EGL_noChange, k_most_read_at_once, ERM_fileOnly);
-  if (read.bad() || !file->getDataset())
-    return error("{}: expected a complete DICOM file, found one that is damaged ({}). Copy it again.",
-                 path.string(), read.text());
-  return file;
-}
-
-std::string text_at(DcmDataset* data, const DcmTagKey& tag) {
-  OFString text;
-  return data->findAndGetOFString(tag, text).good() ? as_utf8(std::string(text.c_str())) : "";
-}
-
-// Some numbers of an element; false when it has not as many.
-template <int count>
-bool read_numbers(DcmDataset* data, const DcmTagKey& tag, Eigen::Matrix<double, count, 1>* out) {
-  for (int i = 0; i < count; ++i) {
-    Float64 value = 0;
-    if (data->findAndGetFloat64(tag, value, static_cast<unsigned long>(i)).bad()) return false;
-    (*out)[i] = value;
-  }
-  return out->allFinite();
-}
-
-long integer_at(DcmDataset* data, const DcmTagKey& tag, long otherwise) {
-  Uint16 value = 0;
-  return data->findAndGetUint16(tag, value).good() ? value : otherwise;
-}
-
-double number_at(DcmDataset* data, const DcmTagKey& tag, double otherwise) {
-  Float64 value = 0;
-  return data->findAndGetFloat64(tag, value).good() && std::isfinite(value) ? value : otherwise;
-}
-
-std::string series_name(DcmDataset* data) {
+std::string series_name(DcmItem* data) {
   const std::string number = text_at(data, DCM_SeriesNumber), words = text_at(data, DCM_SeriesDescription);
   if (number.empty()) return words.empty() ? "" : "'" + words + "'";
   return words.empty() ? number : number + " '" + words + "'";
 }
 
-Status check_kind(DcmDataset* data, const std::string& where) {
-  Sint32 frames = 1;
-  if (data->findAndGetSint32(DCM_NumberOfFrames, frames).good() && frames > 1)
-    return error(
-        "{}: expected files of one slice each, found one with {} (enhanced DICOM). Convert it to NIfTI, for "
-        "example with dcm2niix.",
-        where, frames);
+DcmItem* item_at(DcmItem* item, const DcmTagKey& sequence, long index) {
+  DcmItem* found = nullptr;
+  return item && item->findAndGetSequenceItem(sequence, found, index).good() ? found : nullptr;
+}
+
+// Where the attributes of one frame are: in its own functional groups, in those that all frames share, or
+// beside the image (files of one slice).
+struct FrameAttributes {
+  DcmItem* data = nullptr;
+  DcmItem* own = nullptr;
+  DcmItem* shared = nullptr;
+
+  DcmItem* in(const DcmTagKey& group) const {
+    if (!own && !shared) return data;
+    DcmItem* of_frame = item_at(own, group, 0);
+    return of_frame ? of_frame : item_at(shared, group, 0);
+  }
+};
+
+// The number of frames. Error: colours, or too many.
+Result<int> read_kind(DcmItem* data, const std::string& where) {
+  const long frames = integer_at(data, DCM_NumberOfFrames, 1);
+  if (frames > k_most_frames)
+    return error("{}: expected at most {} slices in a file, found {}. Crop the volume.", where, k_most_frames,
+                 frames);
   const std::string colours = text_at(data, DCM_PhotometricInterpretation);
   if (integer_at(data, DCM_SamplesPerPixel, 1) != 1 || !colours.starts_with("MONOCHROME"))
     return error("{}: expected a slice of grey values, found {}.", where,
                  colours.empty() ? "no image" : "'" + colours + "'");
-  return {};
+  return static_cast<int>(std::max(1L, frames));
 }
 
-Status read_place(DcmDataset* data, const std::string& where, DicomSlice* slice) {
+Status read_place(const FrameAttributes& attributes, const std::string& where, DicomSlice* slice) {
   Eigen::Matrix<double, 6, 1> directions;
   Eigen::Vector2d between_rows_columns;
-  if (!read_numbers(data, DCM_ImagePositionPatient, &slice->p_first_lps_mm) ||
-      !read_numbers(data, DCM_ImageOrientationPatient, &directions) ||
-      !read_numbers(data, DCM_PixelSpacing, &between_rows_columns))
+  if (!read_numbers(attributes.in(DCM_PlanePositionSequence), DCM_ImagePositionPatient,
+                    &slice->p_first_lps_mm) ||
+      !read_numbers(attributes.in(DCM_PlaneOrientationSequence), DCM_ImageOrientationPatient, &directions) ||
+      !read_numbers(attributes.in(DCM_PixelMeasuresSequence), DCM_PixelSpacing, &between_rows_columns))
     return error(
         "{}: expected a slice with its place (ImagePositionPatient, ImageOrientationPatient, PixelSpacing), "
         "found one without. Remove images that are no slices, such as reports.",
@@ -118,6 +87,17 @@ Status read_place(DcmDataset* data, const std::string& where, DicomSlice* slice)
   return {};
 }
 
+// What its functional groups state of a frame.
+Status read_frame(const FrameAttributes& attributes, const std::string& where, DicomSlice* slice) {
+  LIMN_TRY_STATUS(read_place(attributes, where, slice));
+  DcmItem* const window = attributes.in(DCM_FrameVOILUTSequence);
+  slice->window = {number_at(window, DCM_WindowCenter, 0), number_at(window, DCM_WindowWidth, 0)};
+  DcmItem* const rescale = attributes.in(DCM_PixelValueTransformationSequence);
+  slice->slope = number_at(rescale, DCM_RescaleSlope, 1);
+  slice->offset = number_at(rescale, DCM_RescaleIntercept, 0);
+  return {};
+}
+
 // How the bits of a stored value make a number.
 struct Bits {
   int stored = 16, shift = 0;
@@ -130,13 +110,13 @@ struct Bits {
   }
 };
 
-template <class Word>
-void rescale(const Word* words, std::size_t count, Bits bits, double slope, double offset, float* values) {
-  for (std::size_t i = 0; i < count; ++i)
-    values[i] = static_cast<float>(slope * bits.number(words[i]) + offset);
-}
+// The bits of a file's values, and how many bytes each has.
+struct Layout {
+  Bits bits;
+  int bytes = 2;
+};
 
-Status copy_values(DcmDataset* data, const std::string& where, std::size_t count, float* values) {
+Result<Layout> read_layout(DcmItem* data, const std::string& where) {
   const long allocated = integer_at(data, DCM_BitsAllocated, 0);
   const long stored = integer_at(data, DCM_BitsStored, allocated),
              high = integer_at(data, DCM_HighBit, stored - 1);
@@ -144,54 +124,137 @@ Status copy_values(DcmDataset* data, const std::string& where, std::size_t count
       high + 1 < stored)
     return error("{}: expected values of 8 or 16 bits, found {} bits ({} stored, the highest {}).", where,
                  allocated, stored, high);
-  const Bits bits{static_cast<int>(stored), static_cast<int>(high + 1 - stored),
-                  integer_at(data, DCM_PixelRepresentation, 0) == 1};
-  const double slope = number_at(data, DCM_RescaleSlope, 1),
-               offset = number_at(data, DCM_RescaleIntercept, 0);
-  unsigned long found = 0;
-  const Uint8* bytes = nullptr;
-  const Uint16* words = nullptr;
-  const bool is_there = allocated == 8 ? data->findAndGetUint8Array(DCM_PixelData, bytes, &found).good()
-                                       : data->findAndGetUint16Array(DCM_PixelData, words, &found).good();
-  if (!is_there || found < count || (!bytes && !words))
-    return error("{}: expected {} values, found {}. Copy the file again.", where, count,
-                 is_there ? found : 0);
-  if (bytes)
-    rescale(bytes, count, bits, slope, offset, values);
-  else
-    rescale(words, count, bits, slope, offset, values);
-  return {};
+  return Layout{{static_cast<int>(stored), static_cast<int>(high + 1 - stored),
+                 integer_at(data, DCM_PixelRepresentation, 0) == 1},
+                static_cast<int>(allocated / 8)};
+}
+
+bool is_jpeg(E_TransferSyntax syntax) {
+  const DcmXfer xfer(syntax);
+  return std::string(xfer.getXferName()).starts_with("JPEG") && syntax != EXS_JPEG2000 &&
+         syntax != EXS_JPEG2000LosslessOnly;
 }
 
 }  // namespace
 
-Result<DicomSlice> read_dicom_slice(const fs::path& path) {
+std::string DicomSlice::name() const {
+  const std::string file = as_utf8(path.filename().string());
+  return frames == 1 ? file : fmt::format("{} (frame {})", file, frame + 1);
+}
+
+Result<std::vector<DicomSlice>> read_dicom_slices(const fs::path& path) {
   const std::string where = path.string();
-  LIMN_TRY(const std::unique_ptr<DcmFileFormat> file, open(path));
+  LIMN_TRY(const std::unique_ptr<DcmFileFormat> file, open_dicom(path));
   DcmDataset* data = file->getDataset();
-  LIMN_TRY_STATUS(check_kind(data, where));
+  LIMN_TRY(const int frames, read_kind(data, where));
+  FrameAttributes attributes;
+  attributes.data = data;
+  attributes.shared = item_at(data, DCM_SharedFunctionalGroupsSequence, 0);
   DicomSlice slice;
   slice.path = path;
+  slice.frames = frames;
   slice.series = text_at(data, DCM_SeriesInstanceUID);
   slice.series_name = series_name(data);
   slice.size = {integer_at(data, DCM_Columns, 0), integer_at(data, DCM_Rows, 0)};
-  LIMN_TRY_STATUS(read_place(data, where, &slice));
-  slice.window = {number_at(data, DCM_WindowCenter, 0), number_at(data, DCM_WindowWidth, 0)};
   slice.is_dark_high = text_at(data, DCM_PhotometricInterpretation) == "MONOCHROME1";
-  return slice;
+  std::vector<DicomSlice> slices;
+  for (slice.frame = 0; slice.frame < frames; ++slice.frame) {
+    attributes.own = item_at(data, DCM_PerFrameFunctionalGroupsSequence, slice.frame);
+    if (frames > 1 && !attributes.own)
+      return error(
+          "{}: expected the place of each of its {} frames (enhanced DICOM), found none of frame {}. Convert "
+          "it to NIfTI, for example with dcm2niix.",
+          where, frames, slice.frame + 1);
+    LIMN_TRY_STATUS(read_frame(
+        attributes, frames == 1 ? where : fmt::format("{}, frame {}", where, slice.frame + 1), &slice));
+    slices.push_back(slice);
+  }
+  return slices;
 }
 
-Status read_dicom_values(const DicomSlice& slice, float* values) {
-  const std::string where = slice.path.string();
-  LIMN_TRY(const std::unique_ptr<DcmFileFormat> file, open(slice.path));
-  DcmDataset* data = file->getDataset();
-  if (data->chooseRepresentation(EXS_LittleEndianExplicit, nullptr).bad() ||
-      !data->canWriteXfer(EXS_LittleEndianExplicit))
+struct DicomValues::File {
+  std::string where;
+  std::unique_ptr<DcmFileFormat> file;
+  DcmPixelData* pixels = nullptr;
+  DcmFileCache cache;
+  Layout layout;
+  E_TransferSyntax syntax = EXS_Unknown;
+  Uint32 fragment = 1;  // that of the next frame; the first fragment is a table
+  std::vector<std::uint8_t> frame;
+
+  // Error: a JPEG image of another size than the slice's, for which its decoder would take memory.
+  Status check_jpeg(const DicomSlice& slice) const {
+    DcmPixelSequence* fragments = nullptr;
+    DcmPixelItem* first = nullptr;
+    if (pixels->getEncapsulatedRepresentation(syntax, nullptr, fragments).bad() || !fragments ||
+        fragments->getItem(first, fragment).bad() || !first)
+      return error("{}: expected {} compressed images, found fewer. Copy the file again.", where,
+                   slice.frames);
+    std::vector<std::uint8_t> head(std::min<std::size_t>(first->getLength(), k_longest_jpeg_head));
+    if (!head.empty() && first->getPartialValue(head.data(), 0, static_cast<Uint32>(head.size())).bad())
+      head.clear();
+    const auto size = jpeg_size(head);
+    if (!size || (*size)[0] != slice.size[0] || (*size)[1] != slice.size[1])
+      return error("{}: expected a JPEG image of {} x {} grey values, found {}. Copy the file again.", where,
+                   slice.size[0], slice.size[1],
+                   size ? fmt::format("{} x {}", (*size)[0], (*size)[1]) : "another or a damaged one");
+    return {};
+  }
+};
+
+DicomValues::DicomValues(std::unique_ptr<File> file) : file_(std::move(file)) {}
+DicomValues::DicomValues(DicomValues&&) noexcept = default;
+DicomValues::~DicomValues() = default;
+
+Result<DicomValues> DicomValues::open(const fs::path& path) {
+  auto out = std::make_unique<File>();
+  out->where = path.string();
+  LIMN_TRY(out->file, open_dicom(path));
+  DcmDataset* data = out->file->getDataset();
+  LIMN_TRY(out->layout, read_layout(data, out->where));
+  out->syntax = data->getOriginalXfer();
+  DcmElement* element = nullptr;
+  if (data->findAndGetElement(DCM_PixelData, element).good())
+    out->pixels = dynamic_cast<DcmPixelData*>(element);
+  if (!out->pixels) return error("{}: expected an image, found none. Copy the file again.", out->where);
+  return DicomValues(std::move(out));
+}
+
+Status DicomValues::read(const DicomSlice& slice, float* values) {
+  File& file = *file_;
+  DcmDataset* data = file.file->getDataset();
+  if (is_jpeg(file.syntax)) {
+    LIMN_TRY_STATUS(file.check_jpeg(slice));
+  }
+  const std::size_t count = static_cast<std::size_t>(slice.size[0] * slice.size[1]),
+                    bytes = count * static_cast<std::size_t>(file.layout.bytes);
+  file.frame.resize(bytes + bytes % 2);
+  Uint32 stated = 0;
+  OFString colours;
+  const bool is_encoded = DcmXfer(file.syntax).isEncapsulated();
+  if (file.pixels->getUncompressedFrameSize(data, stated).bad() || stated != bytes ||
+      file.pixels
+          ->getUncompressedFrame(data, static_cast<Uint32>(slice.frame), file.fragment, file.frame.data(),
+                                 static_cast<Uint32>(file.frame.size()), colours, &file.cache)
+          .bad()) {
+    if (!is_encoded)
+      return error("{}: expected {} values for each slice, found fewer. Copy the file again.", file.where,
+                   count);
     return error(
         "{}: expected values without compression, or as RLE, JPEG or JPEG-LS, found '{}', or damaged ones. "
         "Decompress the series, for example with gdcmconv --raw.",
-        where, DcmXfer(data->getOriginalXfer()).getXferName());
-  return copy_values(data, where, static_cast<std::size_t>(slice.size[0] * slice.size[1]), values);
+        file.where, DcmXfer(file.syntax).getXferName());
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    std::uint32_t word = file.frame[i];
+    if (file.layout.bytes == 2) {
+      std::uint16_t two = 0;  // in this machine's order of bytes
+      std::memcpy(&two, file.frame.data() + 2 * i, sizeof two);
+      word = two;
+    }
+    values[i] = static_cast<float>(slice.slope * file.layout.bits.number(word) + slice.offset);
+  }
+  return {};
 }
 
 }  // namespace limn::scene

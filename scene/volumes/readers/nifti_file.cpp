@@ -144,6 +144,10 @@ Status read_values(gzFile_s* file, const nifti_image& image, const std::string& 
   // A slope of 0 means that values are not rescaled.
   const double slope = image.scl_slope == 0 ? 1 : image.scl_slope,
                offset = image.scl_slope == 0 ? 0 : image.scl_inter;
+  constexpr std::int64_t k_most_before = std::int64_t{64} << 20;  // bytes of header extensions
+  if (image.iname_offset < 0 || image.iname_offset > k_most_before)
+    return error("{}: expected values within the first 64 MiB, found them stated at byte {}. Copy it again.",
+                 where, image.iname_offset);
   std::vector<char> slice(in_slice * of_value);
   bool is_complete = gzseek(file, image.iname_offset, SEEK_SET) >= 0;
   for (std::int64_t k = 0; k < image.nz && is_complete; ++k) {
