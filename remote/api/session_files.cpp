@@ -4,15 +4,18 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 #include <vector>
 
 #include "core/file.h"
+#include "core/json_text.h"
 #include "core/names.h"
 #include "device/jpeg.h"
 #include "remote/api/painted_mesh.h"
 #include "remote/api/responses.h"
+#include "remote/glasses/part_cut.h"
 #include "scene/kept_files.h"
 #include "scene/lines/line_file.h"
 #include "scene/meshes/glb.h"
@@ -30,20 +33,30 @@ std::optional<std::string> name_in(const std::string& path, std::string_view beg
   return decoded(std::string_view(path).substr(begin.size(), path.size() - begin.size() - end.size()));
 }
 
-// A look's parts on the prototype, in its finish, as a glTF file; empty: the look has no parts and there is
-// no prototype.
+// A look's parts on the prototype, in its finish, as a glTF file; what the look's plane cuts has `cut` in its
+// node's extras. Empty: the look has no parts and there is no prototype.
 std::string look_assembly(const scene::Scene& scene, const scene::Look& look) {
   std::vector<scene::GlbNode> nodes;
   const scene::Finish* finish = find_named(scene.finishes, look.finish);
   const scene::Mesh painted =
       scene.prototype && finish ? painted_mesh(scene.prototype->mesh, *finish) : scene::Mesh{};
-  if (scene.prototype) nodes.push_back({"prototype", finish ? &painted : &scene.prototype->mesh, Pose()});
+  const auto cut_of = [&](bool is_cut, const Pose& part_from_prototype, int owner) {
+    if (!is_cut || !look.cut || !scene.section) return std::string();
+    const scene::CutPlane plane = scene::transformed(part_from_prototype, *look.cut);
+    return json_text(nlohmann::ordered_json{{"cut", part_cut_json(*scene.section, plane, owner)}});
+  };
+  if (scene.prototype)
+    nodes.push_back({"prototype", finish ? &painted : &scene.prototype->mesh, Pose(),
+                     cut_of(scene.section && scene.section->cuts_prototype, Pose(), 0)});
   for (const scene::Look::Part& part : look.parts) {
     const scene::Slot* slot = scene.find_slot(part.slot);
     if (!slot) continue;
     for (const scene::Variant& variant : slot->variants)
       if (variant.name == part.variant)
-        nodes.push_back({part.slot + " " + part.variant, &variant.mesh, part.prototype_from_part});
+        nodes.push_back(
+            {part.slot + " " + part.variant, &variant.mesh, part.prototype_from_part,
+             cut_of(scene.section && scene.section->cuts(part.slot), part.prototype_from_part.inverse(),
+                    1 + static_cast<int>(slot - scene.slots.data()))});
   }
   return nodes.empty() ? "" : scene::encode_glb(nodes);
 }

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "core/json_text.h"
+#include "remote/glasses/part_cut.h"
 
 namespace limn::remote {
 namespace {
@@ -59,10 +60,16 @@ std::string glasses_parts_message(const scene::PosedScene& posed, const scene::S
   ordered_json out = {{"type", "glasses_parts"}, {"scene", number}, {"prototype", nullptr}};
   if (posed.world_from_prototype) out["prototype"] = short_pose(*posed.world_from_prototype, k_place_steps);
   out["parts"] = ordered_json::array();
-  for (const scene::PosedPart& part : posed.parts)
-    if (const scene::Slot* slot = scene.find_slot(part.slot))
-      out["parts"].push_back({part.slot, part.variant, short_pose(part.world_from_part, k_place_steps),
-                              slot->mode == scene::Mode::surface ? "surface" : "view"});
+  for (const scene::PosedPart& part : posed.parts) {
+    const scene::Slot* slot = scene.find_slot(part.slot);
+    if (!slot) continue;
+    out["parts"].push_back({part.slot, part.variant, short_pose(part.world_from_part, k_place_steps),
+                            slot->mode == scene::Mode::surface ? "surface" : "view"});
+    if (posed.cut && scene.section && scene.section->cuts(part.slot))
+      out["parts"].back().push_back(
+          part_cut_json(*scene.section, scene::transformed(part.world_from_part.inverse(), *posed.cut),
+                        1 + static_cast<int>(slot - scene.slots.data())));
+  }
   return json_text(out);
 }
 

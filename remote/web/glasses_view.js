@@ -1,9 +1,10 @@
 // Draws the parts for each eye of WebXR glasses, over what the person sees. For each eye the prototype is drawn first, into
 // textures: its depth, which hides parts, and where projectors light it. `rest` then leaves a part transparent wherever the ray
 // behind it meets lit prototype, because light shows it there (the rule of shaders/part_coverage.glsl).
+import { bind_cut, Caps, k_cut, k_cut_inputs } from "/cut.js";
 import { GlassesCamera } from "/glasses_camera.js";
 import { product, read_glb } from "/glb.js";
-import { delete_mesh, make_program, upload_mesh } from "/mesh_gl.js";
+import { delete_mesh, make_pass, upload_mesh } from "/mesh_gl.js";
 import { bind_material, k_material, k_material_inputs } from "/mesh_material.js";
 
 const k_near = 0.05,
@@ -20,7 +21,9 @@ uniform mat4 u_world_from_model, u_view_from_world, u_clip_from_view;
 in vec3 a_position;
 out vec3 v_position, v_world;
 ${k_material_inputs}
+${k_cut_inputs}
 void main() {
+  pass_cut(a_position);
   vec4 p_world = u_world_from_model * vec4(a_position, 1), p_view = u_view_from_world * p_world;
   v_world = p_world.xyz;
   v_position = p_view.xyz;
@@ -81,6 +84,7 @@ uniform vec2 u_size;
 in vec3 v_position;
 out vec4 o_colour;
 ${k_material}
+${k_cut}
 const float k_on_surface = 0.002, k_same_place = 1e-4; // m, as in Limn's shaders
 const float k_nearer = 0.03; // m; a hand is nearer than what it hides by more than the depth sensor's noise
 // Distance of real things from the eye's plane, m; 0: not measured there.
@@ -94,7 +98,8 @@ float real_depth(vec2 px) {
 }
 void main() {
   vec4 texel = material_texel();
-  if (texel.a < u_cut_below) discard;
+  vec3 cap = cap_colour();
+  if (is_cut_away() || !u_is_cap && texel.a < u_cut_below) discard;
   ivec2 px = ivec2(gl_FragCoord.xy) - u_corner;
   float depth = u_has_prototype ? texelFetch(s_prototype, px, 0).r : 1.0, z_behind = 1e6;
   bool by_light = false;
@@ -113,7 +118,7 @@ void main() {
     o_colour = vec4(0);
     return;
   }
-  vec3 linear = material_light(texel, normalize(-v_position));
+  vec3 linear = u_is_cap ? cap : material_light(texel, normalize(-v_position));
   o_colour = vec4(pow(clamp(linear, 0.0, 1.0), vec3(1.0 / 2.2)), 1);
 }`;
 
@@ -197,8 +202,10 @@ class MeshStore {
   #all = new Map();
   #fetching = new Set(); // entries on their way
   problem = ""; // why one could not be fetched
-  constructor(gl) {
+  #caps; // what is made for a part's cap is freed with its meshes
+  constructor(gl, caps) {
     this.#gl = gl;
+    this.#caps = caps;
   }
   get is_fetching() {
     return this.#fetching.size > 0;
@@ -221,24 +228,14 @@ class MeshStore {
     return this.#all.get(path).meshes;
   }
   clear() {
-    for (const { meshes } of this.#all.values()) for (const mesh of meshes) delete_mesh(this.#gl, mesh);
+    for (const { meshes } of this.#all.values()) {
+      this.#caps.forget(meshes);
+      for (const mesh of meshes) delete_mesh(this.#gl, mesh);
+    }
     this.#all.clear();
     this.#fetching.clear();
     this.problem = "";
   }
-}
-
-function uniforms_of(gl, program) {
-  const found = new Map();
-  return (name) => {
-    if (!found.has(name)) found.set(name, gl.getUniformLocation(program, name));
-    return found.get(name);
-  };
-}
-
-function make_pass(gl, vertex, fragment) {
-  const program = make_program(gl, vertex, fragment);
-  return { program, at: uniforms_of(gl, program) };
 }
 
 // A sphere of radius 1.
@@ -499,6 +496,7 @@ export class GlassesView {
   #light;
   #hands;
   #meshes;
+  #caps;
   #prototype_pass;
   #part_pass;
   #words_pass;
@@ -522,11 +520,12 @@ export class GlassesView {
   constructor(xr, gl) {
     this.#xr = xr;
     this.#gl = gl;
-    this.#layer = new XRWebGLLayer(xr, gl, { alpha: true, depth: true, antialias: true });
+    this.#layer = new XRWebGLLayer(xr, gl, { alpha: true, depth: true, stencil: true, antialias: true });
     xr.updateRenderState({ baseLayer: this.#layer, depthNear: k_near, depthFar: k_far });
     this.#light = new ProjectorLight(gl);
     this.#hands = new Hands(gl);
-    this.#meshes = new MeshStore(gl);
+    this.#caps = new Caps(gl, make_pass);
+    this.#meshes = new MeshStore(gl, this.#caps);
     this.#prototype_pass = make_pass(gl, k_vertex, k_prototype_fragment);
     this.#part_pass = make_pass(gl, k_vertex, k_part_fragment);
     this.#words_pass = make_pass(gl, k_words_vertex, k_words_fragment);
@@ -581,7 +580,7 @@ export class GlassesView {
     gl.clearColor(0, 0, 0, 0);
     gl.disable(gl.BLEND);
     gl.depthMask(true);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
     for (const view of pose?.views ?? []) {
       const corner = this.#layer.getViewport(view);
       if (!corner?.width) continue;
@@ -697,17 +696,23 @@ export class GlassesView {
       gl.bindTexture(gl.TEXTURE_2D, texture);
       gl.uniform1i(at(name), unit);
     }
-    for (const [slot, variant, pose, where] of parts) {
+    for (const [slot, variant, pose, where, cut = null] of parts) {
       const world_from_part = matrix_of(pose);
       const chosen = override_of(slots.find(({ name }) => name === slot)?.material);
+      const meshes = this.#meshes.of(`/glasses/part/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.glb`);
       gl.uniform1i(at("u_on_surface"), where === "surface");
-      for (const mesh of this.#meshes.of(`/glasses/part/${encodeURIComponent(slot)}/${encodeURIComponent(variant)}.glb`)) {
+      bind_cut(gl, at, cut);
+      for (const mesh of meshes) {
         gl.uniformMatrix4fv(at("u_world_from_model"), false, product(world_from_part, mesh.matrix));
         bind_material(gl, at, mesh, chosen ? [...chosen, 1] : mesh.base);
         gl.uniform1f(at("u_cut_below"), mesh.cut_below);
         gl.bindVertexArray(mesh.array);
         gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
       }
+      if (!cut || !meshes.length) continue;
+      const world_from_mesh = product(world_from_part, meshes[0].matrix);
+      const clip_from_mesh = product(eye.clip_from_view, product(eye.view_from_world, world_from_mesh));
+      this.#caps.draw(meshes, clip_from_mesh, cut, () => this.#use(this.#part_pass, eye));
     }
   }
 

@@ -131,8 +131,8 @@ async function material_of(gltf, bin, material, decoded) {
 }
 
 /**
- * Returns the meshes [{name, matrix, positions, normals, tangents, uvs, second_uvs, indices, base, texture, cut_below, is_unlit, metallic,
- * roughness, emitted, coat, coat_roughness, maps}] of a file's scene. `maps` are {picture, set, scale, strength} by name; `base` is
+ * Returns the meshes [{name, cut, matrix, positions, normals, tangents, uvs, second_uvs, indices, base, texture, cut_below, is_unlit, metallic,
+ * roughness, emitted, coat, coat_roughness, maps}] of a file's scene. `maps` are {picture, set, scale, strength} by name; `cut` is the plane that cuts it (cut.js), or null; `base` is
  * linear RGBA; where the texture's alpha is below `cut_below` the surface has holes; uvs and texture (a bitmap) may be null. Throws an Error whose message can be shown.
  */
 export async function read_glb(buffer) {
@@ -143,7 +143,8 @@ export async function read_glb(buffer) {
   const visit = (index, parent, above) => {
     const node = gltf.nodes[index],
       matrix = product(parent, matrix_of(node)),
-      name = node.name ?? above;
+      name = node.name ?? above,
+      cut = node.extras?.cut ?? null;
     for (const primitive of node.mesh === undefined ? [] : gltf.meshes[node.mesh].primitives) {
       if ((primitive.mode ?? 4) !== 4) continue;
       const positions = numbers_of(gltf, bin, primitive.attributes.POSITION);
@@ -156,6 +157,7 @@ export async function read_glb(buffer) {
       const material = whole?.pbrMetallicRoughness;
       meshes.push({
         name,
+        cut,
         matrix,
         positions,
         indices,

@@ -22,6 +22,21 @@ export function make_program(gl, vertex, fragment) {
   return program;
 }
 
+// Locations of a program's uniforms by name, each asked for once.
+function uniforms_of(gl, program) {
+  const found = new Map();
+  return (name) => {
+    if (!found.has(name)) found.set(name, gl.getUniformLocation(program, name));
+    return found.get(name);
+  };
+}
+
+/** A program of make_program(), and `at`, the locations of its uniforms by name. */
+export function make_pass(gl, vertex, fragment) {
+  const program = make_program(gl, vertex, fragment);
+  return { program, at: uniforms_of(gl, program) };
+}
+
 /** A mesh of read_glb() on the GPU: its members, with `array`, `count`, `texture` and `map_textures`. */
 export function upload_mesh(gl, mesh) {
   const array = gl.createVertexArray();

@@ -1,6 +1,7 @@
 // An interactive 3D view of the parts in WebGL 2; it is drawn only after a change.
+import { bind_cut, Caps, k_cut, k_cut_inputs } from "/cut.js";
 import { product } from "/glb.js";
-import { delete_mesh, make_program, upload_mesh } from "/mesh_gl.js";
+import { delete_mesh, make_pass, upload_mesh } from "/mesh_gl.js";
 import { bind_material, k_material, k_material_inputs } from "/mesh_material.js";
 
 const k_vertex = `#version 300 es
@@ -8,7 +9,9 @@ uniform mat4 u_view_from_model, u_clip_from_view;
 in vec3 a_position;
 out vec3 v_position;
 ${k_material_inputs}
+${k_cut_inputs}
 void main() {
+  pass_cut(a_position);
   vec4 p_view = u_view_from_model * vec4(a_position, 1);
   v_position = p_view.xyz;
   pass_material(mat3(u_view_from_model));
@@ -20,8 +23,12 @@ uniform float u_glow;
 in vec3 v_position;
 out vec4 o_colour;
 ${k_material}
+${k_cut}
 void main() {
-  vec3 linear = material_light(material_texel(), normalize(-v_position)) + u_glow * vec3(0.35, 0.2, 0.04);
+  vec3 cap = cap_colour();
+  if (is_cut_away()) discard;
+  vec3 linear = u_is_cap ? cap : material_light(material_texel(), normalize(-v_position));
+  linear += u_glow * vec3(0.35, 0.2, 0.04);
   o_colour = vec4(pow(linear, vec3(1.0 / 2.2)), 1);
 }`;
 const k_fov = (35 * Math.PI) / 180;
@@ -71,9 +78,10 @@ function perspective(aspect, near, far) {
 /** A 3D view of meshes in a canvas; turned and zoomed by dragging, two fingers, the wheel and keys. Throws without WebGL 2. */
 export class View3d {
   #gl;
-  #program;
+  #pass;
+  #caps;
   #canvas;
-  #meshes = [];
+  #parts = []; // lists of the meshes of each node
   #box = { centre: [0, 0, 0], radius: 1 };
   #yaw = 0.6;
   #pitch = 0.35;
@@ -84,16 +92,22 @@ export class View3d {
 
   constructor(canvas) {
     this.#canvas = canvas;
-    this.#gl = canvas.getContext("webgl2", { antialias: true });
+    this.#gl = canvas.getContext("webgl2", { antialias: true, stencil: true });
     if (!this.#gl) throw new Error("This browser has no WebGL 2. Looks are shown as images only.");
-    this.#program = make_program(this.#gl, k_vertex, k_fragment);
+    this.#pass = make_pass(this.#gl, k_vertex, k_fragment);
+    this.#caps = new Caps(this.#gl, make_pass);
     new ResizeObserver(() => this.#due()).observe(canvas);
     this.#listen();
   }
 
   show(meshes) {
-    for (const mesh of this.#meshes) delete_mesh(this.#gl, mesh);
-    this.#meshes = meshes.map((mesh) => upload_mesh(this.#gl, mesh));
+    for (const part of this.#parts) {
+      this.#caps.forget(part);
+      for (const mesh of part) delete_mesh(this.#gl, mesh);
+    }
+    const uploaded = meshes.map((mesh) => upload_mesh(this.#gl, mesh)),
+      names = [...new Set(meshes.map(({ name }) => name))];
+    this.#parts = names.map((name) => uploaded.filter((mesh) => mesh.name === name));
     this.#box = box_of(meshes);
     this.#due();
   }
@@ -198,23 +212,31 @@ export class View3d {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clearColor(0.03, 0.03, 0.035, 1);
     gl.enable(gl.DEPTH_TEST);
-    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-    gl.useProgram(this.#program);
-    const at = (name) => gl.getUniformLocation(this.#program, name);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
+    const { program, at } = this.#pass;
+    gl.useProgram(program);
     const [view_from_world, away] = this.#view_from_world(),
       { radius } = this.#box;
-    gl.uniformMatrix4fv(
-      at("u_clip_from_view"),
-      false,
-      perspective(canvas.width / canvas.height, Math.max(away - 1.1 * radius, 0.01 * radius), away + 1.1 * radius),
-    );
-    for (const mesh of this.#meshes) {
-      gl.uniformMatrix4fv(at("u_view_from_model"), false, product(view_from_world, mesh.matrix));
-      bind_material(gl, at, mesh);
-      gl.uniform1f(at("u_glow"), this.#marked && mesh.name === this.#marked ? 1 : 0);
-      gl.bindVertexArray(mesh.array);
-      gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
+    const near = Math.max(away - 1.1 * radius, 0.01 * radius),
+      clip_from_view = perspective(canvas.width / canvas.height, near, away + 1.1 * radius);
+    gl.uniformMatrix4fv(at("u_clip_from_view"), false, clip_from_view);
+    for (const part of this.#parts) {
+      const [{ name, cut, matrix }] = part,
+        view_from_model = product(view_from_world, matrix);
+      gl.uniformMatrix4fv(at("u_view_from_model"), false, view_from_model);
+      gl.uniform1f(at("u_glow"), this.#marked && name === this.#marked ? 1 : 0);
+      bind_cut(gl, at, cut);
+      for (const mesh of part) {
+        bind_material(gl, at, mesh);
+        gl.bindVertexArray(mesh.array);
+        gl.drawElements(gl.TRIANGLES, mesh.count, gl.UNSIGNED_INT, 0);
+      }
+      if (!cut) continue;
+      this.#caps.draw(part, product(clip_from_view, view_from_model), cut, () => {
+        gl.useProgram(program);
+        return at;
+      });
     }
-    canvas.dataset.meshes = this.#meshes.length;
+    canvas.dataset.meshes = this.#parts.flat().length;
   }
 }

@@ -235,6 +235,7 @@ std::string encode_glb(std::span<const GlbNode> placed) {
                               {"mesh", document.add_mesh(*mesh.mesh)},
                               {"rotation", {q.x(), q.y(), q.z(), q.w()}},
                               {"translation", {t.x(), t.y(), t.z()}}});
+    if (!mesh.extras.empty()) document.nodes.back()["extras"] = ordered_json::parse(mesh.extras);
   }
   return document.file();
 }

@@ -13,6 +13,7 @@ struct GlbNode {
   std::string name;  ///< The node's name in the file.
   const Mesh* mesh = nullptr;
   Pose assembly_from_mesh;
+  std::string extras = {};  ///< JSON that the node has as `extras`; empty: none.
 };
 
 /// The bytes of a binary glTF 2.0 file in metres. It has a node for each mesh with its pose and one primitive

@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "remote/glasses/glasses_messages.h"
 #include "tests/remote/a_headset.h"
 #include "tests/support/matchers.h"
 
@@ -124,6 +125,25 @@ TEST_F(SomeGlasses, GetTheirPlaceAndThePartsInFewBytes) {
   ASSERT_TRUE(viewpoints_["Ann"]);
   EXPECT_LT((*viewpoints_["Ann"] - headset.world_from_eye(headset.at_s()).translation).norm(), 0.03);
   EXPECT_LE(most_bytes_, k_most_bytes);
+}
+
+TEST_F(SomeGlasses, GetThePlaneThatCutsAPartInItsOwnFrame) {
+  scene_.section.emplace();
+  scene_.section->slots = {"mirror"};
+  scene_.section->hatch_m = 0.005;
+  SessionUpdate shown = update(100);
+  const auto part_of = [&] { return json::parse(glasses_parts_message(shown.posed, scene_, 1))["parts"][0]; };
+  EXPECT_EQ(part_of().size(), 4u);
+  shown.posed.cut = scene::CutPlane{{0, 0, 1}, 0.35};  // the part is at z = 0.3
+  const json cut = part_of()[4];
+  EXPECT_EQ(cut["normal"], json({0, 0, 1}));
+  EXPECT_NEAR(cut["offset_m"].get<double>(), 0.05, 1e-9);
+  const Eigen::Vector3d hatch(cut["hatch"][0], cut["hatch"][1], cut["hatch"][2]);
+  EXPECT_NEAR(hatch.norm(), 200, 0.2) << "lines in a metre";
+  EXPECT_NEAR(hatch.z(), 0, 0.1) << "along the plane";
+  EXPECT_EQ(cut["colour"].size(), 3u);
+  scene_.section->slots.clear();
+  EXPECT_EQ(part_of().size(), 4u);
 }
 
 TEST_F(SomeGlasses, TheirLossIsSentAndEndsTheViewpoint) {
