@@ -2,24 +2,17 @@
 
 #include <vector>
 
-#include "core/result.h"
-#include "core/rig.h"
-#include "scene/posed_scene.h"
-#include "sim/world.h"
+#include "scene/room_image.h"
 #include "validate/demo_page.h"
+#include "validate/demo_room.h"
 
 namespace limn::validate {
 
-/// What the painting of the demo needs.
-struct DemoPainting {
-  const scene::Scene* scene = nullptr;
-  const Rig* rig = nullptr;           ///< As calibrated.
-  const sim::World* world = nullptr;  ///< The truth, in its usual light.
-  scene::PosedScene posed;            ///< As tracked.
-};
+/// The light of a photographer's studio as a picture of the room, whose middle lies in front of the door.
+scene::RoomImage studio(const Pose& world_from_door);
 
 /// Photographs of the door in a dim room, before and after it is painted in light with its first finish,
-/// which mirrors the picture of a studio, with the parts on it. Needs a current GL context.
-Result<std::vector<DemoImage>> painted_images(const DemoPainting& painting);
+/// which mirrors the scene's picture of the room, with the parts on it.
+std::vector<DemoImage> painted_images(const DemoSubject& subject, const DimRoom& room);
 
 }  // namespace limn::validate

@@ -20,7 +20,9 @@
 #include "tracker/body_estimate.h"
 #include "tracker/detector.h"
 #include "tracker/marker_image.h"
+#include "validate/demo_clay.h"
 #include "validate/demo_painting.h"
+#include "validate/demo_room.h"
 #include "validate/light_chain.h"
 #include "validate/metrics.h"
 #include "wizard/capture/capture_plan.h"
@@ -348,8 +350,32 @@ nlohmann::ordered_json json_of(const DemoMeasurement& measured) {
   return json;
 }
 
+// Images of the door in a dim room: finishes, lines, a section, and the deviation of its clay.
+Result<std::vector<DemoImage>> dim_room_images(const fs::path& out,
+                                               const DemoSession& session,
+                                               const sim::World& world,
+                                               const scene::PosedScene& posed) {
+  scene::Scene scene = session.scene;
+  scene.room_image = studio(*posed.world_from_prototype);
+  LIMN_TRY_STATUS(add_clay_work(&scene));
+  LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, session.rig));
+  LIMN_TRY_STATUS(renderer.set_light({.compensation = projector::Compensation::geometry}));
+  const DemoSubject subject{&scene, &session.rig, &world, &renderer, posed};
+  const DimRoom room(world);
+  std::vector<DemoImage> images = painted_images(subject, room);
+  const auto add = [&](std::vector<DemoImage> some) {
+    for (DemoImage& image : some) images.push_back(std::move(image));
+  };
+  add(line_images(subject, room));
+  add(cut_images(subject, room));
+  LIMN_TRY(std::vector<DemoImage> compared, deviation_images(subject, out / "demo-scan"));
+  add(std::move(compared));
+  return images;
+}
+
 // Images for people: what the renderer draws and what the simulator photographs.
-Result<std::vector<DemoImage>> session_images(DemoSession* session,
+Result<std::vector<DemoImage>> session_images(const fs::path& out,
+                                              DemoSession* session,
                                               sim::VirtualRig* room,
                                               const Place& place) {
   const scene::PosedScene& posed = place.moment.posed;
@@ -404,9 +430,8 @@ Result<std::vector<DemoImage>> session_images(DemoSession* session,
   demo_images.push_back({"mask", "Mask",
                          "From the designer's viewpoint: white is projected, grey is left to the screen.",
                          merged_masks(renderer.coverage(posed, viewer), {viewer.width, viewer.height})});
-  LIMN_TRY(std::vector<DemoImage> painted,
-           painted_images({&session->scene, &session->rig, &room->world(), posed}));
-  for (DemoImage& image : painted) demo_images.push_back(std::move(image));
+  LIMN_TRY(std::vector<DemoImage> dim, dim_room_images(out, *session, room->world(), posed));
+  for (DemoImage& image : dim) demo_images.push_back(std::move(image));
   return demo_images;
 }
 
@@ -444,8 +469,9 @@ Result<DemoResult> play_demo(const fs::path& out, bool keep_captures) {
   measured.composite_px =
       phases.time("judge", [&] { return composite_error_px(&session, truth_world, truth, moment); });
   measured.mask_iou = phases.time("judge", [&] { return mask_iou(&session, truth_world, truth, moment); });
-  LIMN_TRY(auto images,
-           phases.time("render", [&] { return session_images(&session, &room, measured.places.front()); }));
+  LIMN_TRY(auto images, phases.time("render", [&] {
+    return session_images(out, &session, &room, measured.places.front());
+  }));
   measured.seconds = phases.seconds();
   return DemoResult{rows_of(measured), json_text(json_of(measured), 2) + "\n", std::move(images)};
 }
