@@ -381,7 +381,7 @@ std::string lossless_jpeg(const std::vector<int>& values, int columns, int rows)
     int bits = 0;
     while (std::abs(difference) >> bits != 0) ++bits;
     add_bits(bits, 5);
-    add_bits(difference < 0 ? difference - 1 : difference, bits);
+    if (bits < 16) add_bits(difference < 0 ? difference - 1 : difference, bits);  // 16: it is 32768
   }
   while (used != 0) add_bits(1, 1);
   return out + "\xff\xd9";
