@@ -2,7 +2,7 @@
 
 #include "core/image_encoder.h"
 #include "device/gl_context.h"
-#include "session/thumbnail.h"
+#include "session/drawing/thumbnail.h"
 
 namespace limn::remote {
 namespace {

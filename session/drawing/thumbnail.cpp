@@ -1,4 +1,4 @@
-#include "session/thumbnail.h"
+#include "session/drawing/thumbnail.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
