@@ -368,8 +368,12 @@ Result<std::vector<DemoImage>> dim_room_images(const fs::path& out,
   };
   add(line_images(subject, room));
   add(cut_images(subject, room));
-  LIMN_TRY(std::vector<DemoImage> compared, deviation_images(subject, out / "demo-scan"));
-  add(std::move(compared));
+  const fs::path scan = out / "demo-scan";
+  auto compared = deviation_images(subject, scan);
+  std::error_code ignored;
+  fs::remove_all(scan, ignored);  // only the images made of it are kept
+  if (!compared) return compared.error();
+  add(std::move(*compared));
   return images;
 }
 
