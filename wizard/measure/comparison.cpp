@@ -59,7 +59,7 @@ Result<calib::DeviationReport> compared(const ScanBesideCad& both,
   calib::DeviationReport report;
   report.made_at = time_now();
   report.registration = registration;
-  if (!options.is_given && !report.registration.free_directions.empty())
+  if (options.is_given && !report.registration.free_directions.empty())
     report.registration.covariance = limited(report.registration.covariance, radius_of(both.mesh));
   LIMN_TRY(report.deviation, calib::deviation(both.mesh, both.scan, report.registration,
                                               {.tolerance_m = options.tolerance_m,

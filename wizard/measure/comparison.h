@@ -34,7 +34,8 @@ struct ComparisonOptions {
   double tolerance_m = 0.5e-3;
   double reach_m = 5e-3;
   double spacing_m = 0;  ///< 0: that of the scan
-  /// The registration was not made by limn: free directions may state any covariance, which is not changed.
+  /// The pose was given: its registration may state a metre along free directions, as limn align does. It
+  /// then counts as k_free_stddev_m.
   bool is_given = false;
   ReportStage report_stage = {};  ///< Stages: sample, compare.
 };
