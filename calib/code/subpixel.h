@@ -58,9 +58,8 @@ StripeShare stripe_share(const AxisReading& reading, const AxisLabels& labels);
 
 /// Computes subpixel coordinates. Where a bit's image and inverse cross between two camera pixels of
 /// neighbouring labels, the camera sees the edge between those labels, independent of blur, global light and
-/// the surface's colour. Along rows and along columns, pixels between two such crossings are interpolated,
-/// over longer distances by a parabola that also uses the crossings before and after them; the two results
-/// are averaged by their variances. Pixels that are not between two edges keep what they
+/// the surface's colour. Along rows and along columns, pixels between two such crossings are interpolated;
+/// the two results are averaged by their variances. Pixels that are not between two edges keep what they
 /// have. `floor_px`: standard deviation that remains besides noise. An edge that a shake has moved has its
 /// label at the place where the mean image of the series shows it; of a pair whose two images had different
 /// light the difference of that light is subtracted.
