@@ -557,6 +557,19 @@ int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
   return known;
 }
 
+// Image minus inverse on the two sides of a stripe's edge, levels, CV_16S, at least 1. In Gray code some bit has no edge
+// near a pixel, so that its difference is the whole one; of combined bits (xor) all have their edges together.
+cv::Mat edge_contrast(const std::array<AxisReading, 2>& axes, PatternCode code, const cv::Mat& white_less_black) {
+  cv::Mat contrast;
+  if (code == PatternCode::exclusive_or)
+    white_less_black.convertTo(contrast, CV_16S);
+  else
+    contrast = cv::Mat(white_less_black.size(), CV_16S, cv::Scalar(1));
+  for (const AxisReading& axis : axes)
+    for (const cv::Mat& difference : axis.differences) contrast = cv::max(contrast, cv::abs(difference));
+  return cv::max(contrast, 1);
+}
+
 }  // namespace
 
 Result<cv::Mat> read_shot(const std::filesystem::path& path, int width, int height, int used_bits) {
@@ -615,8 +628,10 @@ Result<Decoded> decode(const Patterns& patterns,
                          : any_label(steps.fine.size()));
   }
   settle_shake(labels, &decoded.quality.shake, &axes);
+  const cv::Mat contrast = edge_contrast(axes, patterns.code, decoded.contrast);
   for (size_t axis = 0; axis < 2; ++axis) {
-    if (axes[axis].bits() > 0) refine_between_edges(axes[axis], noise, options.floor_px, &labels[axis]);
+    if (axes[axis].bits() > 0)
+      refine_between_edges(axes[axis], noise, contrast, options.floor_px, &labels[axis]);
     to_pixels(block, &labels[axis]);
     if (waves.empty()) continue;
     const std::vector<PairShake> shake = settled(std::move(of_steps[axis]), decoded.quality.shake);

@@ -2,9 +2,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -14,6 +16,11 @@ namespace {
 constexpr float k_no_label = std::numeric_limits<float>::quiet_NaN();
 // Camera pixels between two edges; over more, a line does not describe the surface.
 constexpr int k_longest = 64;
+// Camera pixels between two edges below which labels are straight: noise would be taken for curvature.
+constexpr float k_straight = 4;
+// Standard deviation of the labels' curvature where it is not known, labels per camera pixel^2: over 10
+// pixels a line is then wrong by 0.01 pixels, as the floor is.
+constexpr float k_any_curvature = 1e-3F;
 constexpr int k_field = 16;           // side of a field that a plane is fitted to, camera pixels
 constexpr double k_one_surface = 1;   // labels, root mean square beside the plane
 constexpr size_t k_least_edges = 12;  // in a field
@@ -44,23 +51,99 @@ struct Sums {
   cv::Mat value, weight;
 };
 
-// Interpolates the pixels after `first` up to `second` of a line; `step`: elements from one pixel to the
-// next.
-void fill_between(
-    const Crossing& first, const Crossing& second, float floor, float* value, float* weight, size_t step) {
-  const int from = static_cast<int>(std::floor(first.at)) + 1, to = static_cast<int>(std::floor(second.at));
-  const float length = second.at - first.at;
-  const float rise = second.label - first.label;
-  const float scale = (rise / length) * (rise / length);
-  for (int i = from; i <= to; ++i) {
-    const float share = (static_cast<float>(i) - first.at) / length;
-    const float u = first.label + share * rise;
-    const float variance =
-        scale * ((1 - share) * (1 - share) * first.variance + share * share * second.variance) + floor;
-    value[static_cast<size_t>(i) * step] += u / variance;
-    weight[static_cast<size_t>(i) * step] += 1 / variance;
-  }
+// The second derivative of the labels along a line at the middle one of three crossings, labels per camera
+// pixel^2.
+struct Curvature {
+  float value = 0, variance = 0;
+};
+Curvature curvature_at(const Crossing& before, const Crossing& middle, const Crossing& after, float floor) {
+  const float length_a = middle.at - before.at, length_b = after.at - middle.at, span = length_a + length_b;
+  const float slope_a = (middle.label - before.label) / length_a,
+              slope_b = (after.label - middle.label) / length_b;
+  const auto of_slope = [&](float slope, float length, const Crossing& a, const Crossing& b) {
+    return (slope * slope * (a.variance + b.variance) + 2 * floor) / (length * length);
+  };
+  return {2 * (slope_b - slope_a) / span,
+          4 / (span * span) *
+              (of_slope(slope_a, length_a, before, middle) + of_slope(slope_b, length_b, middle, after))};
 }
+
+// The curvature of the labels between two crossings, from those before and after them (null: there is none).
+Curvature curvature_between(const Crossing* before,
+                            const Crossing& first,
+                            const Crossing& second,
+                            const Crossing* after,
+                            float floor) {
+  if (!before && !after) return {0, k_any_curvature * k_any_curvature};
+  if (!before || !after) {
+    const Curvature one = before ? curvature_at(*before, first, second, floor)
+                                 : curvature_at(first, second, *after, floor);
+    return {one.value, one.variance + one.value * one.value};
+  }
+  const Curvature a = curvature_at(*before, first, second, floor),
+                  b = curvature_at(first, second, *after, floor);
+  const float half = (a.value - b.value) / 2;  // it changes by as much: what a parabola does not follow
+  return {(a.value + b.value) / 2, (a.variance + b.variance) / 4 + half * half};
+}
+
+// The crossings of one line of camera pixels, neighbours on one surface. Interpolates the pixels between each
+// two of them when the one after them is known.
+class Run {
+ public:
+  // The sums of the line's first pixel, and the number of elements from one pixel to the next.
+  struct Line {
+    float *value, *weight;
+    size_t step;
+    float floor;
+  };
+
+  void add(const Crossing& next, const Line& line) {
+    if (count_ > 0) {
+      const Crossing& last = last_[static_cast<size_t>(count_ - 1)];
+      if (next.edge == last.edge || next.at - last.at >= k_longest) end(line);
+    }
+    if (count_ == 3) {
+      fill(&last_[0], last_[1], last_[2], &next, line);
+      last_ = {last_[1], last_[2], next};
+      return;
+    }
+    if (count_ == 2) fill(nullptr, last_[0], last_[1], &next, line);
+    last_[static_cast<size_t>(count_++)] = next;
+  }
+
+  void end(const Line& line) {
+    if (count_ == 3) fill(&last_[0], last_[1], last_[2], nullptr, line);
+    if (count_ == 2) fill(nullptr, last_[0], last_[1], nullptr, line);
+    count_ = 0;
+  }
+
+ private:
+  static void fill(const Crossing* before,
+                   const Crossing& first,
+                   const Crossing& second,
+                   const Crossing* after,
+                   const Line& line) {
+    const int from = static_cast<int>(std::floor(first.at)) + 1, to = static_cast<int>(std::floor(second.at));
+    const float length = second.at - first.at, rise = second.label - first.label;
+    const float scale = (rise / length) * (rise / length);
+    const Curvature curvature =
+        length < k_straight ? Curvature{} : curvature_between(before, first, second, after, line.floor);
+    const auto [low, high] = std::minmax(first.label, second.label);
+    for (int i = from; i <= to; ++i) {
+      const float share = (static_cast<float>(i) - first.at) / length;
+      const float bend = length * length * share * (1 - share) / 2;
+      const float u = std::clamp(first.label + share * rise - bend * curvature.value, low, high);
+      const float variance =
+          scale * ((1 - share) * (1 - share) * first.variance + share * share * second.variance) +
+          bend * bend * curvature.variance + line.floor;
+      line.value[static_cast<size_t>(i) * line.step] += u / variance;
+      line.weight[static_cast<size_t>(i) * line.step] += 1 / variance;
+    }
+  }
+
+  std::array<Crossing, 3> last_;
+  int count_ = 0;
+};
 
 // The labels of neighbouring lines or pixels, and the sums that interpolated values are added to.
 struct Place {
@@ -73,7 +156,25 @@ struct Axis {
   const DifferenceNoise& noise;
   const AxisLabels& labels;
   float floor;
+  const cv::Mat& contrast;
 };
+
+// Where a pixel lies in the blurred edge of a stripe, whose profile is an error function: standard deviations of
+// the blur from the edge's middle.
+struct EdgePlace {
+  float at = 0;
+  float slope = 0;  // derivative by the pixel's difference, 1 / levels
+};
+EdgePlace place_on_edge(float difference, float contrast) {
+  constexpr float k_whole = 0.95F;  // of the contrast: beyond it noise says nothing about the place
+  const float share = std::clamp(difference / contrast, -k_whole, k_whole);
+  // Inverse error function by Winitzki's approximation (0.2 %).
+  constexpr float k_a = 0.147F, k_two_over_pi_a = 2 / (std::numbers::pi_v<float> * k_a);
+  const float log = std::log(1 - share * share), half = k_two_over_pi_a + log / 2;
+  const float square = 2 * (std::sqrt(half * half - log / k_a) - half);
+  return {std::copysign(std::sqrt(std::max(0.0F, square)), share),
+          std::sqrt(std::numbers::pi_v<float> / 2) * std::exp(square / 2) / contrast};
+}
 
 // Finds where the difference of the bit that changes at `edge` crosses zero between pixels a and b; `at` is
 // the position along the line.
@@ -83,63 +184,71 @@ Crossing crossing(const Axis& axis, int edge, cv::Point a, cv::Point b, int at) 
   float first = difference.ptr<short>(a.y)[a.x], second = difference.ptr<short>(b.y)[b.x];
   if ((first > 0) == (second > 0)) return {};
   float label = static_cast<float>(edge) - 0.5F;
-  const float step = first - second, variance = axis.noise.at(a.x, a.y);
-  float share = first / step;
-  const float scale = variance * ((1 - share) * (1 - share) + share * share) / (step * step);
   if (!axis.reading.shake.empty()) {
     const PairShake& shake = axis.reading.shake[bit];
-    const auto more = static_cast<float>(shake.gain_difference / 2);
-    share = (first - more * static_cast<float>(axis.noise.sum.ptr<ushort>(a.y)[a.x])) / step;
+    const float more = static_cast<float>(shake.gain_difference / 2) *
+                       static_cast<float>(axis.noise.sum.ptr<ushort>(a.y)[a.x]);
+    first -= more;
+    second -= more;
     const cv::Vec2f slope = axis.reading.slopes.at(a.x, a.y);
     const float moved =
         slope[0] * static_cast<float>(shake.shift_px.x()) + slope[1] * static_cast<float>(shake.shift_px.y());
     if (!std::isnan(moved)) label += moved;
   }
-  return {edge, static_cast<float>(at) + share, label, scale};
+  const EdgePlace from = place_on_edge(first, axis.contrast.at<short>(a)),
+                  to = place_on_edge(second, axis.contrast.at<short>(b));
+  const float step = from.at - to.at, share = from.at / step;
+  if (!(share > -1 && share < 2)) return {};  // of a pair whose two images had too different light
+  const float off_a = (1 - share) * from.slope, off_b = share * to.slope;
+  const float variance = axis.noise.at(a.x, a.y) * (off_a * off_a + off_b * off_b) / (step * step);
+  return {edge, static_cast<float>(at) + share, label, variance};
 }
 
-// Moves from pixel a to pixel b of a line; `last` is the previous edge.
+// Moves from pixel a to pixel b of a line.
 void pass(const Axis& axis,
           const Place& labels,
           cv::Point a,
           cv::Point b,
           int at,
-          Crossing* last,
-          float* value,
-          float* weight,
-          size_t step) {
+          Run* run,
+          const Run::Line& line) {
   const int low_a = labels.low_a[a.x], end_a = labels.end_a[a.x];
   const int low_b = labels.low_b[b.x], end_b = labels.end_b[b.x];
   if (low_a == low_b && end_a == end_b && low_a != end_a) return;
   if (nested(low_a, end_a, low_b, end_b)) return;  // the same label, perhaps a coarser one
   const int edge = edge_between(low_a, end_a, low_b, end_b);
   const Crossing next = edge > 0 ? crossing(axis, edge, a, b, at) : Crossing{};
-  if (last->edge >= 0 && next.edge >= 0 && next.edge != last->edge && next.at - last->at < k_longest)
-    fill_between(*last, next, axis.floor, value, weight, step);
-  *last = next;
+  if (next.edge >= 0)
+    run->add(next, line);
+  else
+    run->end(line);
 }
 
 void along_rows(const Axis& axis, Sums* sums) {
   for (int y = 0; y < axis.labels.low.rows; ++y) {
     const short *low = axis.labels.low.ptr<short>(y), *end = axis.labels.end.ptr<short>(y);
-    float *value = sums->value.ptr<float>(y), *weight = sums->weight.ptr<float>(y);
-    Crossing last;
+    const Run::Line line = {sums->value.ptr<float>(y), sums->weight.ptr<float>(y), 1, axis.floor};
+    Run run;
     for (int x = 0; x + 1 < axis.labels.low.cols; ++x)
-      pass(axis, {low, end, low, end}, {x, y}, {x + 1, y}, x, &last, value, weight, 1);
+      pass(axis, {low, end, low, end}, {x, y}, {x + 1, y}, x, &run, line);
+    run.end(line);
   }
 }
 
 void along_columns(const Axis& axis, Sums* sums) {
   const AxisLabels& labels = axis.labels;
   const auto columns = static_cast<size_t>(labels.low.cols);
-  std::vector<Crossing> last(columns);
-  float *value = sums->value.ptr<float>(), *weight = sums->weight.ptr<float>();
+  std::vector<Run> runs(columns);
+  const auto line = [&](size_t x) {
+    return Run::Line{sums->value.ptr<float>() + x, sums->weight.ptr<float>() + x, columns, axis.floor};
+  };
   for (int y = 0; y + 1 < labels.low.rows; ++y) {
     const Place place = {labels.low.ptr<short>(y), labels.end.ptr<short>(y), labels.low.ptr<short>(y + 1),
                          labels.end.ptr<short>(y + 1)};
     for (int x = 0; x < labels.low.cols; ++x)
-      pass(axis, place, {x, y}, {x, y + 1}, y, &last[static_cast<size_t>(x)], value + x, weight + x, columns);
+      pass(axis, place, {x, y}, {x, y + 1}, y, &runs[static_cast<size_t>(x)], line(static_cast<size_t>(x)));
   }
+  for (size_t x = 0; x < columns; ++x) runs[x].end(line(x));
 }
 
 // A plane u = offset + slope . (x, y) through points; nullopt when they lie on a line.
@@ -289,9 +398,10 @@ StripeShare stripe_share(const AxisReading& reading, const AxisLabels& labels) {
 
 void refine_between_edges(const AxisReading& reading,
                           const DifferenceNoise& noise,
+                          const cv::Mat& contrast,
                           double floor_px,
                           AxisLabels* labels) {
-  const Axis axis{reading, noise, *labels, static_cast<float>(floor_px * floor_px)};
+  const Axis axis{reading, noise, *labels, static_cast<float>(floor_px * floor_px), contrast};
   Sums sums{cv::Mat(labels->low.size(), CV_32F, cv::Scalar(0)),
             cv::Mat(labels->low.size(), CV_32F, cv::Scalar(0))};
   along_rows(axis, &sums);

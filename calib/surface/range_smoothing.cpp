@@ -169,16 +169,65 @@ struct Pairs {
   }
 };
 
-// Normalised residuals around a pixel, as an image; empty where there is too little of one surface.
-cv::Mat residuals_around(const Ranges& ranges, const cv::Mat& links, cv::Point at, Window* window) {
+// A quartic, so that what is left of the ranges of a wide window is noise, not the surface's shape.
+constexpr int k_quartic_order = 4, k_quartic_terms = 15;
+using Fifteen = Eigen::Matrix<double, k_quartic_terms, 1>;
+
+Fifteen quartic_terms(double x, double y) {
+  Fifteen t;
+  int k = 0;
+  double power_x = 1;
+  for (int i = 0; i <= k_quartic_order; ++i, power_x *= x) {
+    double power = power_x;
+    for (int j = 0; i + j <= k_quartic_order; ++j, power *= y) t[k++] = power;
+  }
+  return t;
+}
+
+// The noise around a pixel, as images of its window: NaN where nothing is known.
+struct WindowNoise {
+  cv::Mat ranges;     // residuals of a quartic through the inverse ranges, in stated standard deviations
+  cv::Mat epipolar;   // the epipolar residuals; empty: the code has no rows
+  cv::Mat left_over;  // what a quartic through them leaves
+};
+
+// Empty where there is too little of one surface.
+WindowNoise noise_around(const Ranges& ranges, const cv::Mat& links, cv::Point at, Window* window) {
   const std::vector<Neighbour>& around = window->around(ranges, links, at);
   if (static_cast<int>(around.size()) < window->area() / 2) return {};
-  const auto fit = fitted(around);
-  if (!fit) return {};
-  cv::Mat image(2 * k_noise_half + 1, 2 * k_noise_half + 1, CV_64F, cv::Scalar(k_nowhere));
-  for (const Neighbour& n : around)
-    image.at<double>(n.dy + k_noise_half, n.dx + k_noise_half) = residual(n, *fit) / n.sigma;
-  return image;
+  using Squares = Eigen::Matrix<double, k_quartic_terms, k_quartic_terms>;
+  const bool has_epipolar = !std::isnan(ranges.epipolar.at<double>(at));
+  Squares a = Squares::Zero();
+  Eigen::Matrix<double, k_quartic_terms, 2> b = Eigen::Matrix<double, k_quartic_terms, 2>::Zero();
+  const auto terms_of = [](const Neighbour& n) {
+    return quartic_terms(static_cast<double>(n.dx) / k_noise_half, static_cast<double>(n.dy) / k_noise_half);
+  };
+  const auto epipolar = [&](const Neighbour& n) {
+    return has_epipolar ? ranges.epipolar.at<double>(at.y + n.dy, at.x + n.dx) : 0.0;
+  };
+  const double q0 = around.front().q;
+  for (const Neighbour& n : around) {
+    const Fifteen t = terms_of(n) / n.sigma;
+    a.selfadjointView<Eigen::Lower>().rankUpdate(t);
+    b.col(0) += (n.q - q0) / n.sigma * t;
+    b.col(1) += epipolar(n) * t;
+  }
+  const Eigen::LLT<Squares> factored(a.selfadjointView<Eigen::Lower>());
+  if (factored.info() != Eigen::Success) return {};
+  const Eigen::Matrix<double, k_quartic_terms, 2> fit = factored.solve(b);
+  if (!fit.allFinite()) return {};
+  const int side = 2 * k_noise_half + 1;
+  WindowNoise noise{cv::Mat(side, side, CV_64F, cv::Scalar(k_nowhere)), {}, {}};
+  if (has_epipolar) noise.epipolar = noise.ranges.clone(), noise.left_over = noise.ranges.clone();
+  for (const Neighbour& n : around) {
+    const Fifteen t = terms_of(n) / n.sigma;
+    const cv::Point in_window(n.dx + k_noise_half, n.dy + k_noise_half);
+    noise.ranges.at<double>(in_window) = (n.q - q0) / n.sigma - t.dot(fit.col(0));
+    if (!has_epipolar) continue;
+    noise.epipolar.at<double>(in_window) = epipolar(n);
+    noise.left_over.at<double>(in_window) = epipolar(n) - t.dot(fit.col(1));
+  }
+  return noise;
 }
 
 // Robust size of residuals (1.4826 median, which is the standard deviation of a normal distribution; at least
@@ -205,22 +254,29 @@ Noise measured_noise(const Ranges& ranges, const cv::Mat& links, int smooth_half
   noise.scale = cv::Mat((links.rows + k_noise_step - 1) / k_noise_step,
                         (links.cols + k_noise_step - 1) / k_noise_step, CV_32F, cv::Scalar(k_nowhere));
   Pairs pairs;
-  std::vector<float> scales;
+  std::vector<float> scales, absorbed;
   int number = 0;
   for (int r = 0; r < noise.scale.rows; ++r) {
     for (int c = 0; c < noise.scale.cols; ++c) {
       const cv::Point at(std::min(links.cols - 1, c * k_noise_step + k_noise_step / 2),
                          std::min(links.rows - 1, r * k_noise_step + k_noise_step / 2));
       if (std::isnan(ranges.range.at<double>(at))) continue;
-      const cv::Mat residuals = residuals_around(ranges, links, at, &window);
-      if (residuals.empty()) continue;
-      const double scale = size_of(residuals);
+      const WindowNoise around = noise_around(ranges, links, at, &window);
+      if (around.ranges.empty()) continue;
+      const double scale = size_of(around.ranges);
       noise.scale.at<float>(r, c) = static_cast<float>(scale);
       scales.push_back(static_cast<float>(scale));
-      if (scale > 0 && number++ % k_every == 0) pairs.add(residuals / scale);
+      const cv::Mat& correlated = around.epipolar.empty() ? around.ranges : around.epipolar;
+      const double size = size_of(correlated);
+      if (!around.epipolar.empty())
+        absorbed.push_back(static_cast<float>(size / std::max(1e-6, size_of(around.left_over))));
+      if (size > 0 && number++ % k_every == 0) pairs.add(correlated / size);
     }
   }
-  const float common = median(std::move(scales), 1.0F);
+  // What the fit has taken of the noise: as much as of the epipolar residuals.
+  const float taken = std::max(1.0F, median(std::move(absorbed), 1.0F));
+  const float common = taken * median(std::move(scales), 1.0F);
+  noise.scale *= taken;
   noise.scale.setTo(common, noise.scale != noise.scale);
   noise.scale = cv::max(noise.scale, common / 2);
   const cv::Mat correlation = pairs.correlation();

@@ -66,6 +66,7 @@ struct Reading {
   Verdict verdict = Verdict::nothing;
   double range = 0, variance = 0;
   float epipolar_px = k_no_range;
+  double epipolar_residual = 0;  // standard deviations; NaN: unknown
 };
 
 // The row of a projector's column on the camera ray's image in the projector: between two depths at which the
@@ -121,7 +122,8 @@ Reading read_pixel(const Imager& camera,
   const auto found = triangulate(camera, projector, own, shown, *start);
   if (!found) return {Verdict::angle};
   Reading reading{Verdict::kept, (found->p_world - camera_ray.p_origin).norm(),
-                  camera_ray.d.dot(found->covariance * camera_ray.d), static_cast<float>(found->epipolar_px)};
+                  camera_ray.d.dot(found->covariance * camera_ray.d), static_cast<float>(found->epipolar_px),
+                  found->epipolar_residual};
   const double sigma_px = found->epipolar_px / std::max(found->epipolar_sigmas, 1e-9);
   if (found->epipolar_px > options.max_epipolar_px + k_code_sigmas * sigma_px)
     reading.verdict = Verdict::epipolar;
@@ -166,8 +168,9 @@ std::vector<Reading> read_all(const RangeView& view, const DecodedBy& seen, cons
           if (!row) continue;
           shown = {{label[0], *row}, {variance[0], k_unknown_row_px * k_unknown_row_px}};
         }
-        readings[flat(px.size(), x, y)] =
-            read_pixel(view.camera, *seen.projector, projector_rays, ray, {x, y}, shown, options);
+        Reading& reading = readings[flat(px.size(), x, y)];
+        reading = read_pixel(view.camera, *seen.projector, projector_rays, ray, {x, y}, shown, options);
+        if (std::isnan(label[1])) reading.epipolar_residual = k_no_range;
       }
     }
   });
@@ -190,9 +193,11 @@ Ranges combined(const RangeView& view,
       if (readings[i].verdict != Verdict::kept) continue;
       double& range = all.range.ptr<double>()[i];
       double& variance = all.variance.ptr<double>()[i];
+      double& epipolar = all.epipolar.ptr<double>()[i];
       if (std::isnan(range)) {
         range = readings[i].range;
         variance = readings[i].variance;
+        epipolar = readings[i].epipolar_residual;
         continue;
       }
       const double apart = std::abs(range - readings[i].range);
@@ -200,6 +205,8 @@ Ranges combined(const RangeView& view,
       if (apart > k_conflict_m + k_conflict_sigmas * sigma) conflict.ptr()[i] = 1;
       const double weight = 1 / variance, other = 1 / readings[i].variance;
       range = (weight * range + other * readings[i].range) / (weight + other);
+      epipolar = (std::sqrt(weight) * epipolar + std::sqrt(other) * readings[i].epipolar_residual) /
+                 std::sqrt(weight + other);
       variance = 1 / (weight + other);
     }
   }

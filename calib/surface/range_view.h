@@ -70,8 +70,8 @@ struct DecodedBy {
 /// Triangulates every decoded pixel with each projector, combines the projectors' results by their variances,
 /// cuts at depth edges, and fits a quadric to the inverse ranges around each pixel (from those that are on
 /// one surface with it, weighted by variance and robustly): its centre is the range, its slope the normal.
-/// The noise's true size and its correlation between neighbouring pixels are measured on the fits' residuals,
-/// so that the standard deviations are right after averaging.
+/// The noise's true size and its correlation between neighbouring pixels are measured on the fits' and the
+/// epipolar residuals, so that the standard deviations are right after averaging.
 RangeView range_view(const Imager& camera, std::span<const DecodedBy> seen, const RangeOptions& options = {});
 
 /// The surface that a view measured near a world point.

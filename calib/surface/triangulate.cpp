@@ -71,6 +71,9 @@ std::optional<Triangulated> triangulate(const Imager& a,
     const Eigen::Vector2d off_b = residual_b.cwiseProduct(px_b.variance.cwiseSqrt());
     found.epipolar_px = std::sqrt(off_a.squaredNorm() + off_b.squaredNorm());
     found.epipolar_sigmas = std::sqrt(residual_a.squaredNorm() + residual_b.squaredNorm());
+    const Eigen::Vector2d along = j_b * towards(a, found.p_world);
+    const double side = along.x() * residual_b.y() - along.y() * residual_b.x();
+    found.epipolar_residual = std::copysign(found.epipolar_sigmas, side);
     found.angle = std::acos(std::clamp(towards(a, found.p_world).dot(towards(b, found.p_world)), -1.0, 1.0));
     return found;
   }

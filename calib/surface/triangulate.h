@@ -16,6 +16,9 @@ struct Triangulated {
   /// and the same in standard deviations (chi with one degree of freedom).
   double epipolar_px = 0;
   double epipolar_sigmas = 0;
+  /// epipolar_sigmas with a sign: on which side of a's ray, as b sees it, the pixel of b lies. N(0, 1) if the
+  /// pixels' variances are true; the distance of the point does not show in it.
+  double epipolar_residual = 0;
   double angle = 0;  ///< between the two rays at the point, radians
 };
 
