@@ -113,7 +113,7 @@ Status export_lines(const LineExportOptions& options) {
         options.scene.string());
   std::vector<NamedCurve> curves;
   for (const LineRow& row : rows) curves.insert(curves.end(), row.curves.begin(), row.curves.end());
-  LIMN_TRY_STATUS(scene::write_line_file(curves, options.out));
+  LIMN_TRY_STATUS(scene::write_line_file(curves, options.out, options.form));
   print_lines(rows, options.out, options.json);
   return {};
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "exchange/curves/named_curve.h"
 
 namespace limn::exchange {
 
@@ -12,6 +13,7 @@ struct LineExportOptions {
   std::filesystem::path scene = {};     ///< Folder or its scene.json.
   std::filesystem::path out = {};       ///< .csv, .dxf, .step or .stp.
   std::string look = {};                ///< The lines of this look; empty: the scene's and all drawn ones.
+  exchange::CurveForm form = exchange::CurveForm::polyline;  ///< What STEP has between the points.
   std::vector<std::string> lines = {};  ///< Only these; empty: all that have curves.
   bool json = false;                    ///< Print limn.lines/1.
 };

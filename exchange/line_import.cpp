@@ -30,7 +30,7 @@ fs::path scene_file(const fs::path& scene) {
 
 // The curves by the names of their lines, in the file's order.
 Result<std::vector<LineRow>> read_rows(const LineImportOptions& options) {
-  LIMN_TRY(std::vector<NamedCurve> curves, scene::read_line_file(options.file));
+  LIMN_TRY(std::vector<NamedCurve> curves, scene::read_line_file(options.file, options.edges));
   const std::string stem = as_utf8(options.file.stem().string());
   std::vector<LineRow> rows;
   for (NamedCurve& curve : curves) {

@@ -105,6 +105,7 @@ CLI::App* add_import_lines(CLI::App* import, Run& run) {
       "session that\n"
       "shows the scene shows them at once.\n"
       "Example: limn import lines sill.step --scene scene\n"
+      "Example: limn import lines door.step --scene scene --edges --name edges\n"
       "Example: limn import lines lines.csv --scene scene --name trim --colour 1,0.4,0 --width-mm 1\n"
       "Example: limn import lines sill.dxf --scene scene --replace");
   auto options = std::make_shared<exchange::LineImportOptions>();
@@ -118,6 +119,7 @@ CLI::App* add_import_lines(CLI::App* import, Run& run) {
       ->add_option("--name", options->name,
                    "All curves become one line of this name (without it: a line for each name of the file)")
       ->type_name("NAME");
+  command->add_flag("--edges", options->edges, "Of STEP and IGES also the edges of surfaces");
   command->add_flag("--replace", options->replace,
                     "Lines that the scene has get the file's curves, and keep their colour and width");
   auto colour = std::make_shared<std::vector<double>>();
@@ -167,9 +169,15 @@ CLI::App* add_export_lines(CLI::App* parent, Run& run) {
   command->add_option("--out", options->out, "File to write: .csv, .dxf, .step or .stp")
       ->type_name("FILE")
       ->required();
+  auto is_spline = std::make_shared<bool>(false);
+  command->add_flag("--spline", *is_spline,
+                    "STEP gets a smooth curve through each line's points, which CAD programs can edit (without "
+                    "it: straight pieces)");
   command->add_flag("--json", options->json, "Print limn.lines/1 instead of a sentence for each line");
-  command->callback(
-      [options, &run] { run = [options] { return report_result(exchange::export_lines(*options)); }; });
+  command->callback([options, is_spline, &run] {
+    if (*is_spline) options->form = exchange::CurveForm::spline;
+    run = [options] { return report_result(exchange::export_lines(*options)); };
+  });
   return command;
 }
 

@@ -69,7 +69,7 @@ HttpResponse step_response(const std::vector<exchange::NamedCurve>& curves) {
   if (!mkdtemp(name.data()))
     return error_response(k_http_unavailable, "expected room for a file, found the disk full or read-only.");
   const fs::path folder = name, file = folder / "lines.step";
-  const Status written = scene::write_line_file(curves, file, k_limits);
+  const Status written = scene::write_line_file(curves, file, exchange::CurveForm::polyline, k_limits);
   auto text = written ? read_file(file) : Result<std::string>(written.error());
   fs::remove_all(folder, none);
   return text ? uncached_response("model/step", std::move(*text))

@@ -1,5 +1,5 @@
 // Curves out to STEP and in again, against their closed form and against the text of the file.
-#include "exchange/cad_curves.h"
+#include "scene/lines/line_file.h"
 
 #include <gtest/gtest.h>
 
@@ -27,16 +27,16 @@ using test::Cad;
 using test::IgesText;
 using test::StepText;
 
-class CadCurves : public Cad {
+class LineFile : public Cad {
  protected:
-  std::vector<NamedCurve> read(const fs::path& file, const exchange::CurveReading& how = {}) const {
-    auto curves = exchange::read_cad_curves(file, how);
+  std::vector<NamedCurve> read(const fs::path& file, bool with_edges = false) const {
+    auto curves = scene::read_line_file(file, with_edges);
     EXPECT_TRUE(curves) << curves.message();
     return curves ? *curves : std::vector<NamedCurve>();
   }
 
   std::vector<NamedCurve> out_and_in(const std::vector<NamedCurve>& curves, CurveForm form) const {
-    const Status written = exchange::write_step_curves(curves, folder / "lines.step", form);
+    const Status written = scene::write_line_file(curves, folder / "lines.step", form);
     EXPECT_TRUE(written) << written.message();
     return read(folder / "lines.step");
   }
@@ -71,7 +71,7 @@ double from_helix(const Vector3d& p) {
   return (p - helix(t)).norm();
 }
 
-TEST_F(CadCurves, APolylineComesInAgainAsItWas) {
+TEST_F(LineFile, APolylineComesInAgainAsItWas) {
   const std::vector<NamedCurve> lines = {helix_line(200), square(), {"b", {{0, 0, 0}, {0, 0, 1}}}};
   const auto again = out_and_in(lines, CurveForm::polyline);
   ASSERT_EQ(again.size(), lines.size());
@@ -84,7 +84,7 @@ TEST_F(CadCurves, APolylineComesInAgainAsItWas) {
   }
 }
 
-TEST_F(CadCurves, ASplineStaysOnTheCurveThatItsPointsAreFrom) {
+TEST_F(LineFile, ASplineStaysOnTheCurveThatItsPointsAreFrom) {
   NamedCurve circle{.name = "circle", .is_closed = true};
   for (int i = 0; i < 36; ++i)
     circle.points.emplace_back(0.05 * std::cos(i * M_PI / 18), 0.05 * std::sin(i * M_PI / 18), 0);
@@ -101,19 +101,19 @@ TEST_F(CadCurves, ASplineStaysOnTheCurveThatItsPointsAreFrom) {
 }
 
 // The file's text says what other programs read.
-TEST_F(CadCurves, TheFileIsAp242InMillimetresWithTheCurvesNames) {
-  ASSERT_TRUE(exchange::write_step_curves(
-      {{{"sill \xC3\xBC's", {{0, 0, 0}, {0.25, 0, 0}, {0.25, 0.125, 0}}}}}, folder / "lines.stp"));
+TEST_F(LineFile, TheFileIsAp242InMillimetresWithTheCurvesNames) {
+  ASSERT_TRUE(scene::write_line_file(
+      {{"sill \xC3\xBC's", {{0, 0, 0}, {0.25, 0, 0}, {0.25, 0.125, 0}}}}, folder / "lines.stp"));
   const std::string text = read_file(folder / "lines.stp").value();
   EXPECT_TRUE(std::regex_search(text, std::regex("FILE_SCHEMA\\s*\\(\\(\\s*'AP242")));
   EXPECT_TRUE(std::regex_search(text, std::regex("SI_UNIT\\(\\.MILLI\\.,\\.METRE\\.\\)")));
   EXPECT_NE(text.find(R"(PRODUCT('sill \X2\00FC\X0\''s')"), std::string::npos) << text;
   EXPECT_TRUE(std::regex_search(text, std::regex("CARTESIAN_POINT\\('[^']*',\\(250\\.,125\\.,0\\.\\)\\)")))
       << text;
-  EXPECT_FALSE(fs::exists(folder / ".lines.stp.json")) << "it is only for limn-cad";
+  EXPECT_FALSE(fs::exists(folder / ".lines.stp.curves.json")) << "it is only for limn-cad";
 }
 
-TEST_F(CadCurves, CurvesOfOtherProgramsAreRead) {
+TEST_F(LineFile, CurvesOfOtherProgramsAreRead) {
   StepText step("inch");
   const int corner = step.point({0, 0, 0}), end = step.point({1, 0, 0}), top = step.point({1, 2, 0});
   const int bent = step.add("POLYLINE('bent',(#{},#{},#{}))", corner, end, top);
@@ -134,7 +134,7 @@ TEST_F(CadCurves, CurvesOfOtherProgramsAreRead) {
   EXPECT_GT(worst_along(curves[1], from_circle), 0.0005e-3) << "far too many points";
 }
 
-TEST_F(CadCurves, SegmentsThatTheFileJoinsAreOneCurve) {
+TEST_F(LineFile, SegmentsThatTheFileJoinsAreOneCurve) {
   StepText step;
   const int a = step.point({0, 0, 0}), b = step.point({10, 0, 0}), c = step.point({10, 10, 0}),
             d = step.point({20, 10, 0});
@@ -157,15 +157,15 @@ TEST_F(CadCurves, SegmentsThatTheFileJoinsAreOneCurve) {
     EXPECT_TRUE(test::near(curves[0].points[i], corners[i], 1e-9)) << i;
 }
 
-TEST_F(CadCurves, EdgesOfSurfacesAreReadWhenAskedFor) {
+TEST_F(LineFile, EdgesOfSurfacesAreReadWhenAskedFor) {
   StepText step;
   step.part("box", {step.box({10, 20, 30})});
   const fs::path file = write("box.step", step.file());
-  const auto refused = exchange::read_cad_curves(file);
+  const auto refused = scene::read_line_file(file);
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.message().find("box.step: expected a STEP file with curves"), std::string::npos)
       << refused.message();
-  const auto edges = read(file, {.with_edges = true});
+  const auto edges = read(file, true);
   ASSERT_EQ(edges.size(), 12u);
   double sum = 0;
   for (const NamedCurve& edge : edges) sum += (edge.points.back() - edge.points.front()).norm();
@@ -174,10 +174,21 @@ TEST_F(CadCurves, EdgesOfSurfacesAreReadWhenAskedFor) {
   EXPECT_EQ(edges[1].name, "box 2");
 }
 
-TEST_F(CadCurves, WhatIsNoCurveIsRefusedBeforeAnythingIsWritten) {
+TEST_F(LineFile, SplinesAndEdgesAreOfStepAlone) {
+  const std::vector<NamedCurve> lines = {square()};
+  const Status written = scene::write_line_file(lines, folder / "lines.csv", CurveForm::spline);
+  EXPECT_NE(written.message().find("lines.csv: expected .step or .stp, because splines"), std::string::npos);
+  EXPECT_FALSE(fs::exists(folder / "lines.csv"));
+  ASSERT_TRUE(scene::write_line_file(lines, folder / "lines.dxf"));
+  const auto edges = scene::read_line_file(folder / "lines.dxf", true);
+  ASSERT_FALSE(edges);
+  EXPECT_NE(edges.message().find("lines.dxf: expected a STEP or IGES file"), std::string::npos);
+}
+
+TEST_F(LineFile, WhatIsNoCurveIsRefusedBeforeAnythingIsWritten) {
   const fs::path file = write("lines.step", "the old file");
   const auto refusal_of = [&](const std::vector<NamedCurve>& curves) {
-    const Status status = exchange::write_step_curves(curves, file);
+    const Status status = scene::write_line_file(curves, file);
     return status ? "" : status.message();
   };
   EXPECT_NE(refusal_of({}).find("found none"), std::string::npos);
@@ -186,7 +197,7 @@ TEST_F(CadCurves, WhatIsNoCurveIsRefusedBeforeAnythingIsWritten) {
   EXPECT_NE(refusal_of({{"far", {{0, 0, 0}, {NAN, 0, 0}}}}).find("finite"), std::string::npos);
   EXPECT_NE(refusal_of({{"still", {{0, 0, 0}, {0, 0, 0}}}}).find("0 and 1 equal"), std::string::npos);
   EXPECT_EQ(read_file(file).value(), "the old file");
-  const auto damaged = exchange::read_cad_curves(file);
+  const auto damaged = scene::read_line_file(file);
   ASSERT_FALSE(damaged);
   EXPECT_NE(damaged.message().find("lines.step: expected a whole STEP file"), std::string::npos);
 }
