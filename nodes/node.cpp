@@ -49,6 +49,7 @@ class NodeLoop {
         screens_(&displays_),
         cameras_(room),
         loader_(options.fetch, options.work),
+        deviations_(options.fetch, options.work / "deviation"),
         log_(std::move(log)) {
     offer_.version = version();
     offer_.renderer = context.description();
@@ -61,6 +62,7 @@ class NodeLoop {
     note_host();
     load_setup();
     if (auto loaded = loader_.take_loaded()) begin(std::move(*loaded));
+    if (const auto layer = deviations_.take_loaded()) use_deviation(*layer);
     carry_out_orders();
     screens_.receive(room_->take_screen_images());
     if (const auto moment = room_->take_moment()) show(*moment);
@@ -120,17 +122,35 @@ class NodeLoop {
       setup_ = std::move(*setup);
       load_at_ = now();
     }
-    if (!host_ || !setup_ || !load_at_ || now() < *load_at_) return;
+    if (!host_ || !setup_ || !load_at_ || now() < *load_at_ || !deviations_.is_idle()) return;
     load_at_.reset();
+    const bool draws = frames_ && loader_.is_idle() && drawn_;
     // A host that was restarted with the same session finds it drawn already.
-    if (frames_ && loader_.is_idle() && drawn_ && has_same_content(*drawn_, *setup_)) {
-      frames_->adopt(host_->sender.run, setup_->revision);
-      for (CameraTask& task : camera_tasks_) task.search.setup = setup_->revision;
-      cameras_.detect(camera_tasks_);
-      return;
+    if (draws && has_same_content(*drawn_, *setup_)) return adopt();
+    // Frames go on while the new deviation from the CAD comes.
+    if (draws && differ_in_deviation_only(*drawn_, *setup_)) {
+      adopt();
+      return deviations_.load(*setup_, *host_);
     }
     loading_ = setup_;
     loader_.load(*setup_, *host_);
+  }
+
+  void adopt() {
+    frames_->adopt(host_->sender.run, setup_->revision);
+    for (CameraTask& task : camera_tasks_) task.search.setup = setup_->revision;
+    cameras_.detect(camera_tasks_);
+  }
+
+  void use_deviation(const Result<DeviationLoader::Layer>& layer) {
+    if (!frames_ || !host_ || deviations_.host_run() != host_->sender.run) return;  // its host has gone
+    if (layer) {
+      frames_->use_deviation(*layer);
+      drawn_ = deviations_.setup();
+      return;
+    }
+    log_warning("node: {}", layer.message());
+    if (!load_at_) load_at_ = shifted(now(), k_try_again_s);
   }
 
   void begin(Result<LoadedSetup> loaded) {
@@ -243,6 +263,7 @@ class NodeLoop {
   NodeScreens screens_;
   CameraWorker cameras_;
   SetupLoader loader_;
+  DeviationLoader deviations_;
   AppendLog log_;
   const Stamp entered_at_ = now();
   Offer offer_;

@@ -49,6 +49,11 @@ void NodeFrames::adopt(std::uint64_t run, std::uint64_t revision) {
   setup_.revision = revision;
 }
 
+void NodeFrames::use_deviation(const std::shared_ptr<const scene::DeviationLayer>& layer) {
+  setup_.session.deviation = layer;
+  drawer_->use_deviation(layer);
+}
+
 void NodeFrames::show(const Moment& moment,
                       const std::optional<ClockEstimate>& clock,
                       const Wait& wait,

@@ -37,6 +37,8 @@ class NodeFrames {
             AppendLog* log);
   /// From now on the setup counts as that of another run or revision, whose files and devices are the same.
   void adopt(std::uint64_t run, std::uint64_t revision);
+  /// Frames may show this deviation from the CAD from now on.
+  void use_deviation(const std::shared_ptr<const scene::DeviationLayer>& layer);
   /// Shows the last images with this share of their light.
   void dim(double share);
 

@@ -103,17 +103,44 @@ void RoomHost::apply_edits(const session::SessionMoment& moment) {
   problems_ = std::move(problems);
 }
 
+// What has been shared meanwhile. Frames belong to a setup that has only another deviation from the CAD from
+// now on, so that nodes show them without a break.
+void RoomHost::send_shared(const session::SessionMoment& moment) {
+  if (!sharing_.valid() || sharing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  auto files = sharing_.get();
+  if (files && shares_deviation_only_) {
+    std::vector<SharedFile> all = setup_.files;
+    std::erase_if(all, [](const SharedFile& file) { return file.path == session::k_deviation_file; });
+    all.insert(all.end(), files->begin(), files->end());
+    files = std::move(all);
+    ++revisions_;
+  }
+  if (const Status sent = send_setup(revisions_, std::move(files)); !sent)
+    moment.session.warn(moment.at, fmt::format("the nodes did not get the change: {}", sent.message()));
+}
+
 void RoomHost::publish_state(const session::SessionMoment& moment) {
   if (log_.is_open() && moment.shown) log_images(moment.session, moment.at);
-  if (sharing_.valid() && sharing_.wait_for(std::chrono::seconds(0)) == std::future_status::ready) {
-    if (const Status sent = send_setup(revisions_, sharing_.get()); !sent)
-      moment.session.warn(moment.at, fmt::format("the nodes did not get the change: {}", sent.message()));
-  }
+  send_shared(moment);
   const auto& deviation = moment.session.show_state().deviation.layer;
-  if (sharing_.valid() || (moment.session.scenes() == scenes_ && deviation == deviation_)) return;
-  // Frames are already made for the new setup; nodes wait for it with their last images.
+  const bool is_same_scene = moment.session.scenes() == scenes_;
+  if (sharing_.valid() || (is_same_scene && deviation == deviation_)) return;
   scenes_ = moment.session.scenes();
   deviation_ = deviation;
+  shares_deviation_only_ = is_same_scene;
+  if (is_same_scene) {
+    if (!deviation) return;  // frames say that it is not shown
+    sharing_ = std::async(
+        std::launch::async,
+        [files = files_, deviation, folder = folder_of(revisions_ + 1)]() -> Result<std::vector<SharedFile>> {
+          std::error_code ignored;
+          fs::remove_all(folder, ignored);
+          LIMN_TRY_STATUS(session::save_deviation(*deviation, folder));
+          return files->share(folder);
+        });
+    return;
+  }
+  // Frames are already made for the new setup; nodes wait for it with their last images.
   ++revisions_;
   session::SessionSetup setup = moment.session.setup();
   setup.deviation = deviation;

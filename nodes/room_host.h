@@ -55,6 +55,7 @@ class RoomHost final : public session::SessionClient {
   static Result<std::vector<SharedFile>> shared_files(FileOffer* files,
                                                       const session::SessionSetup& setup,
                                                       const std::filesystem::path& folder);
+  void send_shared(const session::SessionMoment& moment);
   Status send_setup(std::uint64_t revision, Result<std::vector<SharedFile>> files);
   std::filesystem::path folder_of(std::uint64_t revision) const;
 
@@ -69,7 +70,8 @@ class RoomHost final : public session::SessionClient {
   std::shared_ptr<const scene::DeviationLayer> deviation_;  // what nodes have or will have
   session::FrameDescription last_;                          // the last one that was sent
   std::uint64_t revisions_ = 1;
-  std::future<Result<std::vector<SharedFile>>> sharing_;  // for the newest revision
+  std::future<Result<std::vector<SharedFile>>> sharing_;  // what is to be sent next
+  bool shares_deviation_only_ = false;                    // whether that is the deviation, else a whole setup
   int scenes_ = 1;                                        // Session::scenes() of the setup that was sent
   std::set<std::string> nodes_;                           // that the session's devices are plugged into
   std::set<std::string> absent_;                          // those that cannot be heard now

@@ -1,10 +1,17 @@
 #include "nodes/setup_loader.h"
 
+#include <algorithm>
 #include <chrono>
 
 namespace limn::nodes {
 
 namespace fs = std::filesystem;
+
+namespace {
+
+bool is_deviation(const SharedFile& file) { return file.path == session::k_deviation_file; }
+
+}  // namespace
 
 SetupLoader::~SetupLoader() {
   if (loading_.valid()) loading_.wait();
@@ -44,6 +51,41 @@ Result<LoadedSetup> SetupLoader::loaded(const FetchFiles& fetch,
   LIMN_TRY(out.devices, device::parse_devices(wanted.setup.devices, "the host's devices", {}));
   fs::remove_all(folder, ignored);  // all was read
   return out;
+}
+
+DeviationLoader::~DeviationLoader() {
+  if (loading_.valid()) loading_.wait();
+}
+
+void DeviationLoader::load(const Setup& setup, const Machine& host) {
+  setup_ = setup;
+  host_run_ = host.sender.run;
+  Setup file = setup;
+  std::erase_if(file.files, [](const SharedFile& one) { return !is_deviation(one); });
+  loading_ = std::async(
+      std::launch::async,
+      [fetch = fetch_, folder = folder_, file = std::move(file), offer = host.offer]() -> Result<Layer> {
+        LIMN_TRY_STATUS(fetch(file, offer, folder));
+        auto layer = session::load_deviation(folder);
+        std::error_code ignored;
+        fs::remove_all(folder, ignored);
+        return layer;
+      });
+}
+
+std::optional<Result<DeviationLoader::Layer>> DeviationLoader::take_loaded() {
+  if (!loading_.valid() || loading_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return std::nullopt;
+  return loading_.get();
+}
+
+bool differ_in_deviation_only(const Setup& a, const Setup& b) {
+  const auto others = [](std::vector<SharedFile> files) {
+    std::erase_if(files, is_deviation);
+    return files;
+  };
+  return a.devices == b.devices && others(a.files) == others(b.files) &&
+         std::ranges::any_of(b.files, is_deviation);
 }
 
 }  // namespace limn::nodes

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -54,5 +55,35 @@ class SetupLoader {
   std::optional<Wanted> next_;
   std::future<Result<LoadedSetup>> loading_;
 };
+
+/// Fetches and loads the deviation from the CAD of a setup whose other files are here already, on a thread of
+/// its own.
+class DeviationLoader {
+ public:
+  using Layer = std::shared_ptr<const scene::DeviationLayer>;
+  /// `folder`: where the file is laid out.
+  DeviationLoader(FetchFiles fetch, std::filesystem::path folder)
+      : fetch_(std::move(fetch)), folder_(std::move(folder)) {}
+  ~DeviationLoader();
+
+  /// Begins to load that of a setup of a host, which must have one. Nothing must be loading.
+  void load(const Setup& setup, const Machine& host);
+  bool is_idle() const { return !loading_.valid(); }
+  /// What has been loaded since the last call, or why it could not be.
+  std::optional<Result<Layer>> take_loaded();
+  /// The setup that was given to load(), and the run of its host.
+  const Setup& setup() const { return setup_; }
+  std::uint64_t host_run() const { return host_run_; }
+
+ private:
+  FetchFiles fetch_;
+  std::filesystem::path folder_;
+  Setup setup_;
+  std::uint64_t host_run_ = 0;
+  std::future<Result<Layer>> loading_;
+};
+
+/// Whether two setups are the same but for the deviation from the CAD.
+bool differ_in_deviation_only(const Setup& a, const Setup& b);
 
 }  // namespace limn::nodes

@@ -14,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* k_deviation_file = "deviation";
-
 constexpr std::size_t k_most_queued = 40;  // frames; 240 MB of colour 1920x1080
 
 std::int64_t nanoseconds(Stamp at) { return at.time_since_epoch().count(); }
@@ -114,12 +112,24 @@ nlohmann::ordered_json setup_json(const SessionSetup& setup) {
 
 }  // namespace
 
+Status save_deviation(const scene::DeviationLayer& layer, const fs::path& folder) {
+  LIMN_TRY_STATUS(make_folder(folder));
+  return write_file(folder / k_deviation_file, scene::bytes_of(layer));
+}
+
+Result<std::shared_ptr<const scene::DeviationLayer>> load_deviation(const fs::path& folder) {
+  LIMN_TRY(const std::string bytes, read_file(folder / k_deviation_file));
+  auto layer = scene::deviation_layer_of(bytes);
+  if (!layer) return error("{}: {}", (folder / k_deviation_file).string(), layer.message());
+  return std::make_shared<const scene::DeviationLayer>(std::move(*layer));
+}
+
 Status save_setup(const SessionSetup& setup, const fs::path& folder) {
   LIMN_TRY_STATUS(make_folder(folder));
   LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
   LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
   if (setup.deviation)
-    LIMN_TRY_STATUS(write_file(folder / k_deviation_file, scene::bytes_of(*setup.deviation)));
+    LIMN_TRY_STATUS(save_deviation(*setup.deviation, folder));
   return write_file(folder / "session.json", json_text(setup_json(setup), 2) + "\n");
 }
 
@@ -378,11 +388,9 @@ Result<SessionSetup> load_setup(const fs::path& folder) {
   LIMN_TRY(setup.rig, load_rig(rig));
   std::vector<scene::SkippedVariant> skipped_variants;  // the session has left them out, too
   LIMN_TRY(setup.scene, scene::load_scene(scene, &skipped_variants));
-  if (!fs::exists(folder / k_deviation_file)) return setup;
-  LIMN_TRY(const std::string bytes, read_file(folder / k_deviation_file));
-  auto layer = scene::deviation_layer_of(bytes);
-  if (!layer) return error("{}: {}", (folder / k_deviation_file).string(), layer.message());
-  setup.deviation = std::make_shared<const scene::DeviationLayer>(std::move(*layer));
+  if (fs::exists(folder / k_deviation_file)) {
+    LIMN_TRY(setup.deviation, load_deviation(folder));
+  }
   return setup;
 }
 

@@ -9,6 +9,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/frame.h"
@@ -31,6 +32,14 @@ struct SessionSetup {
   std::shared_ptr<const scene::DeviationLayer> deviation = {};
   bool follows_pen = true;  ///< The scene's pen draws; not in a replay, whose strokes were recorded as edits.
 };
+
+/// The file of SessionSetup::deviation in a setup's folder.
+inline constexpr std::string_view k_deviation_file = "deviation";
+
+/// Writes that file alone; load_deviation() reads it. Errors: the folder cannot be written; the file is missing
+/// or damaged.
+Status save_deviation(const scene::DeviationLayer& layer, const std::filesystem::path& folder);
+Result<std::shared_ptr<const scene::DeviationLayer>> load_deviation(const std::filesystem::path& folder);
 
 /// Writes rig/, scene/, session.json and, if there is one, the file `deviation`; load_setup() reads them.
 /// Error: the folder cannot be written.

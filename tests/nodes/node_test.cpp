@@ -15,12 +15,16 @@
 #include "core/version.h"
 #include "device/gl_context.h"
 #include "device/offscreen_display.h"
+#include "nodes/file_listing.h"
 #include "nodes/node_devices.h"
 #include "nodes/node_frames.h"
 #include "nodes/remote_devices.h"
 #include "nodes/room_host.h"
 #include "session/camera_threads.h"
+#include "session/device_health.h"
 #include "session/frame_composer.h"
+#include "session/session.h"
+#include "session/session_output.h"
 #include "sim/virtual_rig.h"
 #include "tests/nodes/memory_room.h"
 #include "tests/support/matchers.h"
@@ -32,17 +36,24 @@ namespace {
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 
-// Files "travel" by their path: the first of a setup is its folder.
+// Files "travel" by their path on this machine, which stands in place of their hash.
 class PathOffer final : public FileOffer {
  public:
   Result<std::vector<SharedFile>> share(const fs::path& folder) override {
-    return std::vector<SharedFile>{{folder.string(), "", 0}};
+    LIMN_TRY(std::vector<SharedFile> files, list_files(folder));
+    for (SharedFile& file : files) file.sha256 = (folder / file.path).string();
+    return files;
   }
 };
 
+std::atomic<int> fetched_files = 0;
+
 Status copy_files(const Setup& setup, const Offer&, const fs::path& folder) {
-  fs::create_directories(folder);
-  fs::copy(setup.files.at(0).path, folder, fs::copy_options::recursive);
+  for (const SharedFile& file : setup.files) {
+    fs::create_directories((folder / file.path).parent_path());
+    fs::copy_file(file.sha256, folder / file.path, fs::copy_options::overwrite_existing);
+    ++fetched_files;
+  }
   return {};
 }
 
@@ -270,6 +281,58 @@ std::string last_shown(const fs::path& folder, std::size_t column) {
   std::istringstream fields(last);
   for (std::size_t i = 0; i <= column; ++i) std::getline(fields, line, ',');
   return line;
+}
+
+// A deviation from the CAD of 0.8 mm everywhere.
+std::shared_ptr<const scene::DeviationLayer> proud(const scene::Mesh& mesh) {
+  scene::DeviationLayer layer;
+  layer.number = 1;
+  for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) layer.triangles.push_back({3 * i, 1});
+  layer.values.assign(3 * mesh.triangles.size(), scene::deviation_value(0.8e-3, 0.02e-3));
+  layer.band_colours.fill(Eigen::Vector3f(0.2f, 0.7f, 0.1f));
+  return std::make_shared<const scene::DeviationLayer>(std::move(layer));
+}
+
+TEST_F(NodeTest, ADeviationComesWhileFramesGoOn) {
+  open_host();
+  auto output = session::SessionOutput::open({}, {}, &setup_);
+  ASSERT_TRUE(output) << output.message();
+  auto session = session::Session::create(setup_, &output->telemetry(), nullptr, false);
+  ASSERT_TRUE(session) << session.message();
+  const session::DeviceHealth health;
+  std::map<std::string, std::string> wanted;
+  const auto send = [&] {
+    client_->publish_state({*session, output->telemetry(), health, now()});
+    const std::uint64_t hash = send_frame();
+    wanted[std::to_string(wanted.size() + 1)] = fmt::format("{:016x}", hash);
+    std::this_thread::sleep_for(40ms);
+  };
+  constexpr int k_frames = 25;
+  std::size_t first = 0;
+  {
+    RunningNode node(&room_, "left", folder_);
+    ASSERT_TRUE(holds_within(20s, [&] {
+      send();
+      return shown_by("left") > 0;
+    }));
+    first = wanted.size();
+    fetched_files = 0;
+    const auto layer = proud(setup_.scene.prototype->mesh);
+    session->show_deviation(layer);
+    show_state_.deviation.layer = layer;
+    show_state_.deviation.is_shown = true;
+    for (int i = 0; i < k_frames; ++i) send();
+  }
+  EXPECT_EQ(fetched_files, 1) << "of the whole setup, only the deviation is new";
+  const auto shown = shown_in(folder_);
+  int of_layer = 0, frames = 0;
+  for (const auto& [frame, hash] : shown) {
+    if (std::stoul(frame) <= first) continue;
+    ++frames;
+    of_layer += hash == wanted.at(frame);
+  }
+  EXPECT_GT(frames, 2 * k_frames / 3) << "the node shows frames all the time";
+  EXPECT_GT(of_layer, k_frames / 2) << "with the deviation, as the host draws them";
 }
 
 TEST_F(NodeTest, ABlackFrameWaitsForNothing) {
