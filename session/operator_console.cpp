@@ -145,6 +145,8 @@ OperatorView OperatorConsole::view_of(const Session& session,
     for (const std::string& device : drift->devices)
       view.moved += (view.moved.empty() ? "" : " or ") + device;
   view.recalibration_progress = session.recalibration().progress;
+  view.has_prototype = session.setup().scene.prototype.has_value();
+  view.deviation_progress = session.deviation().progress;
   view.recent = {recent_.begin(), recent_.end()};
   const auto& notes = telemetry.notes();
   const double begun_s = seconds_of(*begun_at_);

@@ -246,6 +246,20 @@ void OperatorPanel::draw_bar(const gui::Gui& gui, const OperatorView& view) {
     ask(ActionId::marker_states);
   ImGui::SameLine();
   if (gui::toggle("Grid", show_state.grid, gui::colour::k_blue, size)) ask(ActionId::grid);
+  if (view.has_prototype) {
+    ImGui::SameLine();
+    const std::string& progress = view.deviation_progress;
+    if (!progress.empty()) {
+      ImGui::AlignTextToFramePadding();
+      ImGui::TextUnformatted(("Scan: " + progress).c_str());
+    } else if (gui::toggle("Deviation", show_state.deviation.is_shown, gui::colour::k_blue, size)) {
+      ask(ActionId::deviation, "", "toggle");
+    }
+    if (progress.empty() && ImGui::IsItemHovered())
+      ImGui::SetTooltip("%s", show_state.deviation.layer
+                                  ? "Shows or hides how far the prototype is from its CAD."
+                                  : "Scans the prototype (20 s at most) and shows how far it is from its CAD.");
+  }
   if (!view.recalibration_progress.empty()) {
     ImGui::SameLine();
     ImGui::AlignTextToFramePadding();

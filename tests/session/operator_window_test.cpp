@@ -156,6 +156,12 @@ TEST(OperatorPanel, EditsAreAClickAway) {
   EXPECT_FALSE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("repair"));
   view.recalibration_progress.clear();
   view.moved.clear();
+  EXPECT_FALSE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("deviation toggle"));
+  view.has_prototype = true;
+  EXPECT_TRUE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("deviation toggle"));
+  view.deviation_progress = "12 of 44 patterns";
+  EXPECT_FALSE(reachable(view, {1000, 640}, {420, 25, 60, 10}, 3).contains("deviation toggle"));
+  view.deviation_progress.clear();
   std::set<std::string> column = reachable(view, {1000, 640}, {730, 60, 220, 400}, 1);
   column.merge(reachable(view, {1000, 640}, {950, 60, 10, 400}, 1));
   for (const char* edit : {"next_variant mirror", "previous_variant mirror", "next_variant grille",
@@ -172,6 +178,7 @@ TEST(OperatorPanel, PairsAndComparesByClicks) {
   view.show_state.deleted_look = scene::Look{"evening", {}};
   view.show_state.slots[1].marker = MarkerName{"aruco_4x4_50", "30"};
   view.show_state.split = true;
+  view.has_prototype = true;
   test::GuiCanvas canvas({1600, 1000});
   OperatorPanel panel;
   for (int i = 0; i < 2; ++i) canvas.draw([&](gui::Gui& gui) { panel.draw(gui, view); });
