@@ -531,7 +531,7 @@ TEST_F(Cad, MutatedFilesEndInASentence) {
     for (int change = 0; change < 1 + run % 4; ++change)
       bad[rng() % bad.size()] = "0123456789#(),.$*'E-"[rng() % 20];
     const auto report = scene::run_limn_cad(write("bad.step", bad), {"--out", (folder / "out.glb").string()},
-                                            {.seconds = 20, .memory_mb = 1024});
+                                            {.seconds = 10, .memory_mb = 1024});
     if (report) {
       EXPECT_TRUE(scene::load_mesh(folder / "out.glb", {}));
     } else {
