@@ -10,12 +10,12 @@
 namespace limn::exchange {
 
 struct LineExportOptions {
-  std::filesystem::path scene = {};     ///< Folder or its scene.json.
-  std::filesystem::path out = {};       ///< .csv, .dxf, .step or .stp.
-  std::string look = {};                ///< The lines of this look; empty: the scene's and all drawn ones.
+  std::filesystem::path scene = {};  ///< Folder or its scene.json.
+  std::filesystem::path out = {};    ///< .csv, .dxf, .step or .stp.
+  std::string look = {};             ///< The lines of this look; empty: the scene's and all drawn ones.
   exchange::CurveForm form = exchange::CurveForm::polyline;  ///< What STEP has between the points.
-  std::vector<std::string> lines = {};  ///< Only these; empty: all that have curves.
-  bool json = false;                    ///< Print limn.lines/1.
+  std::vector<std::string> lines = {};                       ///< Only these; empty: all that have curves.
+  bool json = false;                                         ///< Print limn.lines/1.
 };
 
 /// `limn export lines`: writes the curves of a scene's lines (curves, texts, dimensions) and of lines that

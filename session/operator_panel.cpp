@@ -256,9 +256,10 @@ void OperatorPanel::draw_bar(const gui::Gui& gui, const OperatorView& view) {
       ask(ActionId::deviation, "", "toggle");
     }
     if (progress.empty() && ImGui::IsItemHovered())
-      ImGui::SetTooltip("%s", show_state.deviation.layer
-                                  ? "Shows or hides how far the prototype is from its CAD."
-                                  : "Scans the prototype (20 s at most) and shows how far it is from its CAD.");
+      ImGui::SetTooltip("%s",
+                        show_state.deviation.layer
+                            ? "Shows or hides how far the prototype is from its CAD."
+                            : "Scans the prototype (20 s at most) and shows how far it is from its CAD.");
   }
   if (!view.recalibration_progress.empty()) {
     ImGui::SameLine();

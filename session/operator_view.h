@@ -74,7 +74,7 @@ struct OperatorView {
   std::vector<ShownFrame> recent;  ///< shown frames, the newest last
   std::vector<Notice> notices;     ///< the newest last
   std::optional<Remote> remote = {};
-  std::string moved = {};                   ///< devices that have moved; empty: none is known
+  std::string moved = {};  ///< devices that have moved; empty: none is known
   bool has_prototype = false;
   std::string deviation_progress = {};      ///< progress of the prototype's scan; empty: none is running
   std::string recalibration_progress = {};  ///< progress of a repair; empty: none is running

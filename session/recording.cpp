@@ -128,8 +128,7 @@ Status save_setup(const SessionSetup& setup, const fs::path& folder) {
   LIMN_TRY_STATUS(make_folder(folder));
   LIMN_TRY_STATUS(save_whole_rig(setup.rig, folder / "rig"));
   LIMN_TRY_STATUS(copy_folder(setup.scene.folder, folder / "scene"));
-  if (setup.deviation)
-    LIMN_TRY_STATUS(save_deviation(*setup.deviation, folder));
+  if (setup.deviation) LIMN_TRY_STATUS(save_deviation(*setup.deviation, folder));
   return write_file(folder / "session.json", json_text(setup_json(setup), 2) + "\n");
 }
 

@@ -36,8 +36,8 @@ struct SessionSetup {
 /// The file of SessionSetup::deviation in a setup's folder.
 inline constexpr std::string_view k_deviation_file = "deviation";
 
-/// Writes that file alone; load_deviation() reads it. Errors: the folder cannot be written; the file is missing
-/// or damaged.
+/// Writes that file alone; load_deviation() reads it. Errors: the folder cannot be written; the file is
+/// missing or damaged.
 Status save_deviation(const scene::DeviationLayer& layer, const std::filesystem::path& folder);
 Result<std::shared_ptr<const scene::DeviationLayer>> load_deviation(const std::filesystem::path& folder);
 

@@ -170,9 +170,10 @@ CLI::App* add_export_lines(CLI::App* parent, Run& run) {
       ->type_name("FILE")
       ->required();
   auto is_spline = std::make_shared<bool>(false);
-  command->add_flag("--spline", *is_spline,
-                    "STEP gets a smooth curve through each line's points, which CAD programs can edit (without "
-                    "it: straight pieces)");
+  command->add_flag(
+      "--spline", *is_spline,
+      "STEP gets a smooth curve through each line's points, which CAD programs can edit (without "
+      "it: straight pieces)");
   command->add_flag("--json", options->json, "Print limn.lines/1 instead of a sentence for each line");
   command->callback([options, is_spline, &run] {
     if (*is_spline) options->form = exchange::CurveForm::spline;

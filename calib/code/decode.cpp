@@ -557,9 +557,12 @@ int join(const AxisLabels& u, const AxisLabels& v, Decoded* decoded) {
   return known;
 }
 
-// Image minus inverse on the two sides of a stripe's edge, levels, CV_16S, at least 1. In Gray code some bit has no edge
-// near a pixel, so that its difference is the whole one; of combined bits (xor) all have their edges together.
-cv::Mat edge_contrast(const std::array<AxisReading, 2>& axes, PatternCode code, const cv::Mat& white_less_black) {
+// Image minus inverse on the two sides of a stripe's edge, levels, CV_16S, at least 1. In Gray code some bit
+// has no edge near a pixel, so that its difference is the whole one; of combined bits (xor) all have their
+// edges together.
+cv::Mat edge_contrast(const std::array<AxisReading, 2>& axes,
+                      PatternCode code,
+                      const cv::Mat& white_less_black) {
   cv::Mat contrast;
   if (code == PatternCode::exclusive_or)
     white_less_black.convertTo(contrast, CV_16S);

@@ -76,8 +76,8 @@ Curvature curvature_between(const Crossing* before,
                             float floor) {
   if (!before && !after) return {0, k_any_curvature * k_any_curvature};
   if (!before || !after) {
-    const Curvature one = before ? curvature_at(*before, first, second, floor)
-                                 : curvature_at(first, second, *after, floor);
+    const Curvature one =
+        before ? curvature_at(*before, first, second, floor) : curvature_at(first, second, *after, floor);
     return {one.value, one.variance + one.value * one.value};
   }
   const Curvature a = curvature_at(*before, first, second, floor),
@@ -159,8 +159,8 @@ struct Axis {
   const cv::Mat& contrast;
 };
 
-// Where a pixel lies in the blurred edge of a stripe, whose profile is an error function: standard deviations of
-// the blur from the edge's middle.
+// Where a pixel lies in the blurred edge of a stripe, whose profile is an error function: standard deviations
+// of the blur from the edge's middle.
 struct EdgePlace {
   float at = 0;
   float slope = 0;  // derivative by the pixel's difference, 1 / levels

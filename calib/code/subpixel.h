@@ -59,14 +59,14 @@ StripeShare stripe_share(const AxisReading& reading, const AxisLabels& labels);
 /// Computes subpixel coordinates. Where a bit's image and inverse cross between two camera pixels of
 /// neighbouring labels, the camera sees the edge between those labels, independent of blur, global light and
 /// the surface's colour. Between the two pixels the edge lies where an error function says, the profile of an
-/// edge that any blur has rounded; `contrast`: image minus inverse on its two sides, CV_16S, levels, at least 1.
-/// (A straight line between them errs by up to 0.1 pixels in a sharp image, which makes waves on a surface
-/// where stripes and pixels beat.) Along rows and along columns, pixels between two such crossings are
-/// interpolated, over longer distances by a parabola that also uses the crossings before and after them; the
-/// two results are averaged by their variances. Pixels that are not between two edges keep what they have.
-/// `floor_px`: standard deviation that remains besides noise. An edge that a shake has moved has its label at
-/// the place where the mean image of the series shows it; of a pair whose two images had different light the
-/// difference of that light is subtracted.
+/// edge that any blur has rounded; `contrast`: image minus inverse on its two sides, CV_16S, levels, at
+/// least 1. (A straight line between them errs by up to 0.1 pixels in a sharp image, which makes waves on a
+/// surface where stripes and pixels beat.) Along rows and along columns, pixels between two such crossings
+/// are interpolated, over longer distances by a parabola that also uses the crossings before and after them;
+/// the two results are averaged by their variances. Pixels that are not between two edges keep what they
+/// have. `floor_px`: standard deviation that remains besides noise. An edge that a shake has moved has its
+/// label at the place where the mean image of the series shows it; of a pair whose two images had different
+/// light the difference of that light is subtracted.
 void refine_between_edges(const AxisReading& reading,
                           const DifferenceNoise& noise,
                           const cv::Mat& contrast,

@@ -81,7 +81,8 @@ Status write_line_file(const std::vector<NamedCurve>& curves,
     return error("{}: expected curves to write, found none. Draw a line first.", path.string());
   const std::string ending = ending_of(path);
   if (form == exchange::CurveForm::spline && (ending == ".csv" || ending == ".dxf"))
-    return error("{}: expected .step or .stp, because splines are asked for, found {}.", path.string(), ending);
+    return error("{}: expected .step or .stp, because splines are asked for, found {}.", path.string(),
+                 ending);
   if (ending == ".csv") return write_file(path, exchange::encode_csv_curves(curves));
   if (ending == ".dxf") return write_file(path, exchange::encode_dxf_curves(curves));
   if (ending != ".step" && ending != ".stp")

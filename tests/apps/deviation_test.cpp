@@ -164,8 +164,7 @@ TEST_F(DoorDeviation, HasAPageAndTables) {
   ASSERT_TRUE(ply.ok()) << ply.message();
   const std::string csv = read_file(out / "deviation.csv").value();
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), ply->positions.size() + 1);
-  for (const char* part : {",measured\n", ",not_measured\n"})
-    test::expect_contains(csv, part);
+  for (const char* part : {",measured\n", ",not_measured\n"}) test::expect_contains(csv, part);
 }
 
 // The handle's region alone; then the pose that was found, which is trusted with its covariance.

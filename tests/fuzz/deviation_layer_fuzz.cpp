@@ -1,6 +1,5 @@
 // A deviation from the CAD as bytes: the file `deviation` of a recording and of a node machine's setup.
 #include "scene/deviation_layer.h"
-
 #include "tests/fuzz/fuzz_file.h"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t size) {

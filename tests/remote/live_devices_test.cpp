@@ -361,7 +361,8 @@ TEST_F(RunningRepair, GuestsAreAnsweredMeanwhileAndToldHowFarItIs) {
   const double longest_s = repair_->longest_edit_s, repair_s = repair_->repair_s;
   const std::set<std::string>& progress = repair_->progress;
   std::printf("during a repair of %.1f s an edit took %.2f s at most\n", repair_s, longest_s);
-  // An image that is being painted, or a painter for the mended rig; without answers meanwhile it would be all of it.
+  // An image that is being painted, or a painter for the mended rig; without answers meanwhile it would be
+  // all of it.
   EXPECT_LT(longest_s, 0.7 * repair_s);
   EXPECT_TRUE(progress.contains("computing"));
   EXPECT_GT(std::count_if(progress.begin(), progress.end(),

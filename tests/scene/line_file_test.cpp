@@ -102,8 +102,8 @@ TEST_F(LineFile, ASplineStaysOnTheCurveThatItsPointsAreFrom) {
 
 // The file's text says what other programs read.
 TEST_F(LineFile, TheFileIsAp242InMillimetresWithTheCurvesNames) {
-  ASSERT_TRUE(scene::write_line_file(
-      {{"sill \xC3\xBC's", {{0, 0, 0}, {0.25, 0, 0}, {0.25, 0.125, 0}}}}, folder / "lines.stp"));
+  ASSERT_TRUE(scene::write_line_file({{"sill \xC3\xBC's", {{0, 0, 0}, {0.25, 0, 0}, {0.25, 0.125, 0}}}},
+                                     folder / "lines.stp"));
   const std::string text = read_file(folder / "lines.stp").value();
   EXPECT_TRUE(std::regex_search(text, std::regex("FILE_SCHEMA\\s*\\(\\(\\s*'AP242")));
   EXPECT_TRUE(std::regex_search(text, std::regex("SI_UNIT\\(\\.MILLI\\.,\\.METRE\\.\\)")));
