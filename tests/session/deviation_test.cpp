@@ -471,7 +471,7 @@ TEST(LiveDeviations, SayWhichDirectionsAFlatPanelLeavesOpen) {
     ++i;
   }
   panel.markers.resize(std::min<std::size_t>(4, panel.markers.size()));
-  const auto world = room_for(test::studio_world(0.4).rig, scene);
+  const auto world = room_for(test::studio_world(0.5).rig, scene);
   ASSERT_TRUE(world) << world.message();
   Played played;
   play(*world, {{0.5, ""}}, k_patterns_s + 2.5, &played);
