@@ -18,8 +18,6 @@ fs::path plan_with(const fs::path& folder, bool is_first_infrared) {
   for (const char* key : {"scene", "slot_markers"}) world.erase(key);
   for (json& object : world["objects"]) object.erase("moves_with_prototype");
   world["cameras"][1]["exposure"] = 2;  // the board is no mirror
-  for (json& camera : world["cameras"]) test::shrink(0.75, &camera);
-  for (json& projector : world["projectors"]) test::shrink(0.5, &projector);
   if (is_first_infrared) std::swap(world["cameras"][0], world["cameras"][1]);
   json plan = test::read_json(test::config_folder() / "plans/bench.json");
   plan["world"] = "world.json";
