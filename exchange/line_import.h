@@ -13,7 +13,7 @@ struct LineImportOptions {
   std::filesystem::path file = {};   ///< CSV, DXF, STEP or IGES, in the prototype's frame.
   std::filesystem::path scene = {};  ///< Folder or its scene.json, which is changed.
   std::string name = {};  ///< All curves become the line of this name; empty: a line for each name.
-  bool edges = false;     ///< Of STEP and IGES also the edges of surfaces.
+  bool edges = false;     ///< STEP and IGES: also the edges of surfaces.
   bool replace = false;   ///< Curves of lines that the scene has are replaced.
   std::optional<Eigen::Vector3d> colour = {};  ///< That new lines have, linear; absent: white.
   std::optional<double> width_mm = {};         ///< That new lines have, on the surface.

@@ -8,10 +8,10 @@
 
 #include "core/append_log.h"
 #include "core/result.h"
-#include "nodes/clock_estimator.h"
-#include "nodes/display_schedule.h"
 #include "nodes/node_devices.h"
 #include "nodes/setup_loader.h"
+#include "nodes/timing/clock_estimator.h"
+#include "nodes/timing/display_schedule.h"
 #include "session/drawing/frame_drawer.h"
 
 namespace limn::nodes {

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "core/result.h"
-#include "nodes/clock_estimator.h"
 #include "nodes/messages.h"
 #include "nodes/room_link.h"
+#include "nodes/timing/clock_estimator.h"
 
 namespace limn::nodes {
 

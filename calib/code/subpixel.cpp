@@ -166,7 +166,7 @@ struct EdgePlace {
   float slope = 0;  // derivative by the pixel's difference, 1 / levels
 };
 EdgePlace place_on_edge(float difference, float contrast) {
-  constexpr float k_whole = 0.95F;  // of the contrast: beyond it noise says nothing about the place
+  constexpr float k_whole = 0.95F;  // share beyond which noise says nothing about the place
   const float share = std::clamp(difference / contrast, -k_whole, k_whole);
   // Inverse error function by Winitzki's approximation (0.2 %).
   constexpr float k_a = 0.147F, k_two_over_pi_a = 2 / (std::numbers::pi_v<float> * k_a);
@@ -198,7 +198,7 @@ Crossing crossing(const Axis& axis, int edge, cv::Point a, cv::Point b, int at) 
   const EdgePlace from = place_on_edge(first, axis.contrast.at<short>(a)),
                   to = place_on_edge(second, axis.contrast.at<short>(b));
   const float step = from.at - to.at, share = from.at / step;
-  if (!(share > -1 && share < 2)) return {};  // of a pair whose two images had too different light
+  if (!(share > -1 && share < 2)) return {};  // the pair's two images had too different light
   const float off_a = (1 - share) * from.slope, off_b = share * to.slope;
   const float variance = axis.noise.at(a.x, a.y) * (off_a * off_a + off_b * off_b) / (step * step);
   return {edge, static_cast<float>(at) + share, label, variance};

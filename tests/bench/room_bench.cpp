@@ -23,12 +23,12 @@
 #include <thread>
 #include <vector>
 
-#include "nodes/display_schedule.h"
 #include "nodes/file_server.h"
 #include "nodes/refresh.h"
 #include "nodes/room.h"
 #include "nodes/room_keys.h"
 #include "nodes/shared_files.h"
+#include "nodes/timing/display_schedule.h"
 
 namespace limn::nodes {
 namespace {

@@ -1,5 +1,5 @@
 // Simulated exchanges between two clocks whose true offset is known, over networks with queues.
-#include "nodes/clock_estimator.h"
+#include "nodes/timing/clock_estimator.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "nodes/display_schedule.h"
+#include "nodes/timing/display_schedule.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "nodes/clock_estimator.h"
+#include "nodes/timing/clock_estimator.h"
 
 #include <algorithm>
 #include <cmath>
