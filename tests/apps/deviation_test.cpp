@@ -165,6 +165,12 @@ TEST_F(DoorDeviation, HasAPageAndTables) {
   const std::string csv = read_file(out / "deviation.csv").value();
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), ply->positions.size() + 1);
   for (const char* part : {",measured\n", ",not_measured\n"}) test::expect_contains(csv, part);
+
+  DeviationCommand strict = command(test::test_folder() / "strict");
+  strict.tolerance_mm = 0.1;  // below two standard deviations of the worst points
+  const Status again = run_deviation(strict);
+  ASSERT_TRUE(again.ok()) << again.message();
+  test::expect_contains(read_file(strict.files.align.out / "deviation.csv").value(), ",uncertain\n");
 }
 
 // The handle's region alone; then the pose that was found, which is trusted with its covariance.

@@ -422,11 +422,8 @@ TEST(Check, FilesWithAnyValueSpoiledNeverCrash) {
     for (Json::json_pointer place(pointer); !place.empty(); place = place.parent_pointer())
       places.insert(place.to_string());
   int refused = 0;
-  std::size_t first = 0;
   for (const std::string& place : places) {
-    first = 1 - first;  // every other value, to save time
-    for (std::size_t i = first; i < wrong.size(); i += 2) {
-      const Json& bad = wrong[i];
+    for (const Json& bad : wrong) {
       Json spoiled = whole;
       spoiled[Json::json_pointer(place)] = bad;
       ASSERT_TRUE(write_file(file, spoiled.dump()));
@@ -439,7 +436,7 @@ TEST(Check, FilesWithAnyValueSpoiledNeverCrash) {
           << place << " " << loaded->message();
     }
   }
-  EXPECT_GT(refused, 75);
+  EXPECT_GT(refused, 150);
 }
 
 TEST(Check, WrongUsageExitsWithTwo) {

@@ -97,6 +97,7 @@ TEST(Calibrate, GoesFromNothingToAGoodRigAndOnFromWhereItWasLeft) {
     EXPECT_LT(poses[i]["held_out_px"].get<double>(), 0.5);
     EXPECT_GT(poses[i]["coverage"]["projector0"].get<double>(), 0.2);
   }
+  EXPECT_NE(poses[2]["more_helps"], "");
   EXPECT_EQ(poses.back()["more_helps"], "")
       << "it goes on until more do not help and the whole solve is good";
   // 36 images for each pose, one every two frames of 1/30 s, and the wait for the last one.
