@@ -166,7 +166,8 @@ TEST_F(DoorDeviation, HasAPageAndTables) {
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), ply->positions.size() + 1);
   for (const char* part : {",measured\n", ",not_measured\n"}) test::expect_contains(csv, part);
 
-  DeviationCommand strict = command(test::test_folder() / "strict");
+  DeviationCommand strict = with;
+  strict.files.align.out = out.parent_path() / "strict";
   strict.tolerance_mm = 0.1;  // below two standard deviations of the worst points
   const Status again = run_deviation(strict);
   ASSERT_TRUE(again.ok()) << again.message();
