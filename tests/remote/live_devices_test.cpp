@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -268,14 +269,17 @@ class RoomProjector : public device::Display {
   const std::string& name() const override { return room_->rig.projector(index_).name(); }
   cv::Size size() const override { return room_->rig.projector(index_).size(); }
   Result<Stamp> show(const cv::Mat& image) override {
+    if (cv::countNonZero(image.reshape(1)) > 1000) ++lit_images_;
     const std::lock_guard lock(room_->mutex);
     const Result<Stamp> shown_at = room_->rig.projector(index_).show(image);
     return shown_at ? Result<Stamp>(std::chrono::steady_clock::now()) : shown_at;
   }
+  int lit_images() const { return lit_images_; }
 
  private:
   SharedRoom* room_;
   int index_;
+  std::atomic<int> lit_images_ = 0;
 };
 
 // A session whose camera was nudged, and what is left of it after a repair while it ran.
@@ -311,7 +315,10 @@ void play_a_repair(Repair* repair) {
   ASSERT_TRUE(perception && session);
   session::SessionDevices devices;
   devices.cameras.push_back(std::make_unique<RoomCamera>(&room, 0));
-  for (int i = 0; i < 2; ++i) devices.projectors.push_back(std::make_unique<RoomProjector>(&room, i));
+  devices.projectors.push_back(std::make_unique<RoomProjector>(&room, 0));
+  auto second = std::make_unique<RoomProjector>(&room, 1);
+  const RoomProjector& lit = *second;
+  devices.projectors.push_back(std::move(second));
   // Meanwhile guests are answered, and progress how far it is.
   ASSERT_TRUE(make_folder(folder / "page").ok());
   ASSERT_TRUE(write_file(folder / "page/index.html", "<title>Limn</title>").ok());
@@ -325,7 +332,7 @@ void play_a_repair(Repair* repair) {
     };
     const std::string token = ask("/api/pair", {{"pin", server->invitation().pins[2]}}, "")["token"];
     const auto begun = std::chrono::steady_clock::now();
-    for (int i = 0; i < 600 && !fs::exists(folder / "recording/rig-2"); ++i) {
+    for (int i = 0; i < 1200 && !fs::exists(folder / "recording/rig-2"); ++i) {
       const auto requested_at = std::chrono::steady_clock::now();
       (void)ask("/api/edit", {{"action", "grid"}, {"value", i % 2 ? "on" : "off"}}, token);
       longest_s = std::max(longest_s, seconds_between(requested_at, std::chrono::steady_clock::now()));
@@ -334,11 +341,14 @@ void play_a_repair(Repair* repair) {
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     repair->repair_s = seconds_between(begun, std::chrono::steady_clock::now());
-    std::this_thread::sleep_for(std::chrono::milliseconds(1500));
+    // Until the mended rig has painted twice, which takes seconds on a busy machine.
+    const int lit_before = lit.lit_images();
+    for (int i = 0; i < 600 && lit.lit_images() < lit_before + 2; ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
     is_ended = true;
   });
   const Status played =
-      session::play_on_devices(&devices, 60, is_ended, {*perception, *session, *output, {server.get()}});
+      session::play_on_devices(&devices, 300, is_ended, {*perception, *session, *output, {server.get()}});
   guest.join();
   ASSERT_TRUE(played.ok()) << played.message();
   ASSERT_TRUE(output->close(&*session, false).ok());
