@@ -217,11 +217,12 @@ Result<std::unique_ptr<CaptureJob>> scan_job(
         "scan "
         "again.");
   const Rig& rig = session.setup().rig;
-  auto work = [rig, folder, input = input_of(session), start = prototype->world_from_body](
+  auto work = [rig, folder, input = input_of(session), start = prototype->world_from_body,
+               markers = seen_markers(scene::bodies(session.setup().scene), before)](
                   const wizard::WizardBackend& devices,
                   const ShouldContinue& should_continue) -> Result<Compared> {
     LIMN_TRY(const ScannedPrototype scanned,
-             scanned_in_place(rig, *input.cad, start, devices, folder, should_continue));
+             scanned_in_place(rig, *input.cad, start, markers, devices, folder, should_continue));
     LIMN_TRY(PrototypeComparison compared, compared_with_cad(scanned, input, should_continue));
     return std::make_shared<const PrototypeComparison>(std::move(compared));
   };

@@ -156,7 +156,7 @@ Result<std::vector<DemoImage>> deviation_images(const DemoSubject& subject,
   sim::VirtualRig rig(std::move(scanned_world), {.grab_waits_for_light = false});
   ImageWriter writer;
   LIMN_TRY(const session::ScannedPrototype scanned,
-           session::scanned_in_place(scanning_rig, cad, *subject.posed.world_from_prototype,
+           session::scanned_in_place(scanning_rig, cad, *subject.posed.world_from_prototype, subject.markers,
                                      wizard::virtual_backend(plan, &rig, &writer), folder, {}));
   LIMN_TRY(const session::PrototypeComparison compared,
            session::compared_with_cad(scanned,

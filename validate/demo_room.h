@@ -6,6 +6,7 @@
 #include "core/rig.h"
 #include "projector/renderer.h"
 #include "scene/posed_scene.h"
+#include "session/deviation/prototype_comparison.h"
 #include "sim/trace.h"
 #include "sim/world.h"
 #include "validate/demo_page.h"
@@ -19,6 +20,7 @@ struct DemoSubject {
   const sim::World* world = nullptr;        ///< The truth, in its usual light.
   projector::Renderer* renderer = nullptr;  ///< For scene and rig, on white clay.
   scene::PosedScene posed = {};             ///< As tracked.
+  std::vector<session::SeenMarker> markers = {};
 };
 
 /// The designer, who stands to the left of the door.

@@ -354,13 +354,14 @@ nlohmann::ordered_json json_of(const DemoMeasurement& measured) {
 Result<std::vector<DemoImage>> dim_room_images(const fs::path& out,
                                                const DemoSession& session,
                                                const sim::World& world,
-                                               const scene::PosedScene& posed) {
+                                               const Moment& moment) {
   scene::Scene scene = session.scene;
-  scene.room_image = studio(*posed.world_from_prototype);
+  scene.room_image = studio(*moment.posed.world_from_prototype);
   LIMN_TRY_STATUS(add_clay_work(&scene));
   LIMN_TRY(projector::Renderer renderer, projector::Renderer::create(scene, session.rig));
   LIMN_TRY_STATUS(renderer.set_light({.compensation = projector::Compensation::geometry}));
-  const DemoSubject subject{&scene, &session.rig, &world, &renderer, posed};
+  const DemoSubject subject{&scene,    &session.rig, &world,
+                            &renderer, moment.posed, session::seen_markers(session.bodies, moment.tracks)};
   const DimRoom room(world);
   std::vector<DemoImage> images = painted_images(subject, room);
   const auto add = [&](std::vector<DemoImage> some) {
@@ -369,8 +370,9 @@ Result<std::vector<DemoImage>> dim_room_images(const fs::path& out,
   add(line_images(subject, room));
   add(cut_images(subject, room));
   const fs::path scan = out / "demo-scan";
-  auto compared = deviation_images(subject, scan);
   std::error_code ignored;
+  fs::remove_all(scan, ignored);  // of a demo that was ended
+  auto compared = deviation_images(subject, scan);
   fs::remove_all(scan, ignored);  // only the images made of it are kept
   if (!compared) return compared.error();
   add(std::move(*compared));
@@ -434,7 +436,7 @@ Result<std::vector<DemoImage>> session_images(const fs::path& out,
   demo_images.push_back({"mask", "Mask",
                          "From the designer's viewpoint: white is projected, grey is left to the screen.",
                          merged_masks(renderer.coverage(posed, viewer), {viewer.width, viewer.height})});
-  LIMN_TRY(std::vector<DemoImage> dim, dim_room_images(out, *session, room->world(), posed));
+  LIMN_TRY(std::vector<DemoImage> dim, dim_room_images(out, *session, room->world(), place.moment));
   for (DemoImage& image : dim) demo_images.push_back(std::move(image));
   return demo_images;
 }

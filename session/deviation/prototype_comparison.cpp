@@ -23,6 +23,9 @@ namespace fs = std::filesystem;
 constexpr double k_around_m = 0.1;
 // The start comes from the tracker: a centimetre at most, as a share of the mesh's diagonal.
 constexpr double k_start_reach_m = 0.015;
+// A marker's plate: the white margin as a share of the marker's side, the clay that its edge hides, and how
+// far the clay is in front of the marker or behind it.
+constexpr double k_paper = 0.15, k_plate_edge_m = 1e-3, k_plate_m = 10e-3;
 // With inverse patterns: the standard deviations then say how large the errors are.
 constexpr auto k_code = calib::PatternCode::gray;
 
@@ -70,6 +73,21 @@ void limit_distances(const Rig& rig,
   range->farthest_m = farthest + k_around_m;
 }
 
+// The scan without what lies where the markers are: their plates, and the edges around these.
+scene::ScanSurface without_markers(const ScannedPrototype& scanned) {
+  const std::vector<Eigen::Vector3f>& points = scanned.surface->positions;
+  std::vector<bool> keep(points.size(), true);
+  for (const SeenMarker& marker : scanned.markers) {
+    const Pose marker_from_world = marker.world_from_marker.inverse();
+    const double half_m = (0.5 + k_paper) * marker.size_m + k_plate_edge_m;
+    const Eigen::AlignedBox3d plate(Eigen::Vector3d(-half_m, -half_m, -k_plate_m),
+                                    Eigen::Vector3d(half_m, half_m, k_plate_m));
+    for (std::size_t i = 0; i < keep.size(); ++i)
+      if (plate.contains(marker_from_world * points[i].cast<double>())) keep[i] = false;
+  }
+  return scene::with_vertices_kept(*scanned.surface, keep);
+}
+
 Status check_rig(const Rig& rig) {
   const bool has_camera = std::ranges::count(rig.cameras, Spectrum::visible, &Imager::sees) > 0;
   if (has_camera && !rig.projectors.empty()) return {};
@@ -97,6 +115,17 @@ Result<calib::Registration> registered(const wizard::ScanBesideCad& both,
 
 }  // namespace
 
+std::vector<SeenMarker> seen_markers(std::span<const Body> bodies, std::span<const Track> tracks) {
+  std::vector<SeenMarker> seen;
+  for (const Track& track : tracks) {
+    const auto body = std::ranges::find(bodies, track.body, &Body::name);
+    if (body == bodies.end() || track.tracking != TrackingState::measured) continue;
+    for (const BodyMarker& marker : body->markers)
+      seen.push_back({track.world_from_body * marker.body_from_marker, marker.size_m});
+  }
+  return seen;
+}
+
 int scan_images(const Rig& rig) {
   int images = 0;
   for (const Imager& projector : rig.projectors)
@@ -108,6 +137,7 @@ int scan_images(const Rig& rig) {
 Result<ScannedPrototype> scanned_in_place(const Rig& rig,
                                           const scene::Mesh& cad,
                                           const Pose& world_from_tracked,
+                                          const std::vector<SeenMarker>& markers,
                                           const wizard::WizardBackend& backend,
                                           const fs::path& folder,
                                           const ShouldContinue& should_continue) {
@@ -123,7 +153,7 @@ Result<ScannedPrototype> scanned_in_place(const Rig& rig,
   limit_distances(rig, box_of(cad), world_from_tracked, &options.range);
   LIMN_TRY(calib::Scan scan, calib::scan_captures(without_infrared(captured), rig, options));
   return ScannedPrototype{std::make_shared<const scene::ScanSurface>(std::move(scan.mesh)),
-                          world_from_tracked, std::move(scan.warnings)};
+                          world_from_tracked, markers, std::move(scan.warnings)};
 }
 
 Result<PrototypeComparison> compared_with_cad(const ScannedPrototype& scanned,
@@ -131,7 +161,8 @@ Result<PrototypeComparison> compared_with_cad(const ScannedPrototype& scanned,
                                               const ShouldContinue& should_continue) {
   const auto begun = std::chrono::steady_clock::now();
   const scene::MeshBvh index(*input.cad);
-  const wizard::ScanBesideCad both{*input.cad, index, *scanned.surface};
+  const scene::ScanSurface scan = without_markers(scanned);
+  const wizard::ScanBesideCad both{*input.cad, index, scan};
   PrototypeComparison out;
   out.scanned = scanned;
   LIMN_TRY(out.whole, registered(both, scanned.world_from_tracked, input));

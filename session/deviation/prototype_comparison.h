@@ -5,12 +5,15 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "calib/report/deviation_report.h"
+#include "core/marker.h"
 #include "core/result.h"
 #include "core/rig.h"
+#include "core/track.h"
 #include "scene/deviation_layer.h"
 #include "scene/meshes/mesh.h"
 #include "scene/meshes/scan_surface.h"
@@ -30,11 +33,20 @@ struct ComparisonInput {
   int number = 1;  ///< DeviationLayer::number of the result.
 };
 
+/// A square marker where the tracker saw it.
+struct SeenMarker {
+  Pose world_from_marker;
+  double size_m = 0;
+};
+std::vector<SeenMarker> seen_markers(std::span<const Body> bodies, std::span<const Track> tracks);
+
 /// A prototype that was scanned in place.
 struct ScannedPrototype {
   std::shared_ptr<const scene::ScanSurface> surface;  ///< Triangles in the world frame, m.
   Pose world_from_tracked;                            ///< Where the tracker saw the prototype then.
-  std::vector<std::string> warnings;                  ///< Those of the scan.
+  /// Markers on it during the scan. Their plates are no part of the CAD: what they cover is not compared.
+  std::vector<SeenMarker> markers;
+  std::vector<std::string> warnings;  ///< Those of the scan.
 };
 
 /// The result of a comparison.
@@ -49,13 +61,14 @@ struct PrototypeComparison {
 using ShouldContinue = std::function<bool()>;
 
 /// Scans whatever stands at `world_from_tracked` with patterns of all projectors: captures into `folder`,
-/// which the caller removes; measures the surface within the surroundings of the CAD. The devices of `backend`
-/// have the rig's names and order; only capture, wait_for_files and use_latency are needed. Errors: no camera
-/// for visible light, a device that fails, nothing measured, a prototype that moved; `should_continue`, which
-/// is called from time to time, returns false.
+/// which the caller removes; measures the surface within the surroundings of the CAD. The devices of
+/// `backend` have the rig's names and order; only capture, wait_for_files and use_latency are needed. Errors:
+/// no camera for visible light, a device that fails, nothing measured, a prototype that moved;
+/// `should_continue`, which is called from time to time, returns false.
 Result<ScannedPrototype> scanned_in_place(const Rig& rig,
                                           const scene::Mesh& cad,
                                           const Pose& world_from_tracked,
+                                          const std::vector<SeenMarker>& markers,
                                           const wizard::WizardBackend& backend,
                                           const std::filesystem::path& folder,
                                           const ShouldContinue& should_continue);

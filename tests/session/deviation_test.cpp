@@ -120,7 +120,7 @@ std::string notes_of(Played& played) {
 }
 
 struct Errors {
-  int count = 0, large = 0;
+  int count = 0, large = 0, on_markers = 0;
   double rms_mm = 0, mean_mm = 0, pull = 0, right_sign = 0;
 };
 
@@ -132,14 +132,23 @@ bool is_near_plate(const scene::Scene& scene, const Vector3d& p) {
   });
 }
 
+bool is_on_marker(const scene::Scene& scene, const Vector3d& p) {
+  constexpr double k_near_m = 0.01;
+  return std::ranges::any_of(scene.prototype->markers, [&](const BodyMarker& marker) {
+    const Vector3d at = marker.body_from_marker.inverse() * p;
+    return at.head<2>().cwiseAbs().maxCoeff() < marker.size_m / 2 && std::abs(at.z()) < k_near_m;
+  });
+}
+
 // Against the clay that was really added or taken away, on the door's outer side.
 Errors errors_of(const calib::Deviation& found, const scene::Scene& scene) {
   Errors e;
   int right = 0;
   for (std::size_t i = 0; i < found.states.size(); ++i) {
     if (!found.has(i) || found.cad.surface.normals[i].z() < 0.3f) continue;
-    if (is_near_plate(scene, found.cad.surface.positions[i].cast<double>())) continue;
-    const double height = test::door_height(found.cad.surface.positions[i].cast<double>());
+    const Vector3d p = found.cad.surface.positions[i].cast<double>();
+    e.on_markers += is_on_marker(scene, p);
+    const double height = test::door_height(p);
     const double off = static_cast<double>(found.distances_m[i]) - height;
     ++e.count;
     e.mean_mm += 1e3 * off;
@@ -177,6 +186,7 @@ TEST_F(LiveDeviation, IsTheClayThatWasAddedOrTakenAway) {
   EXPECT_LT(e.rms_mm, 0.15);
   EXPECT_NEAR(e.pull, 1, 0.2);
   EXPECT_GE(e.right_sign, 0.99);
+  EXPECT_EQ(e.on_markers, 0);
   EXPECT_TRUE(played_->session->show_state().deviation.is_shown);
   EXPECT_EQ(played_->session->deviation().progress, "");
 }
