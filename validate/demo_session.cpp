@@ -371,7 +371,7 @@ Result<std::vector<DemoImage>> dim_room_images(const fs::path& out,
   add(cut_images(subject, room));
   const fs::path scan = out / "demo-scan";
   std::error_code ignored;
-  fs::remove_all(scan, ignored);  // of a demo that was ended
+  fs::remove_all(scan, ignored);  // A demo that was killed left it.
   auto compared = deviation_images(subject, scan);
   fs::remove_all(scan, ignored);  // only the images made of it are kept
   if (!compared) return compared.error();

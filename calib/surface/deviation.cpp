@@ -30,8 +30,9 @@ ScanEdge scan_edge(std::uint32_t a, std::uint32_t b) {
   return (static_cast<ScanEdge>(std::min(a, b)) << 32) | std::max(a, b);
 }
 
-// Whether each vertex lies on an edge that only one triangle has.
-std::vector<bool> vertices_at_edges(const scene::ScanSurface& scan) {
+// Whether each vertex lies on an edge that only one triangle has, or shares a triangle with such a vertex:
+// there the scan's errors are larger than stated.
+std::vector<bool> vertices_near_edges(const scene::ScanSurface& scan) {
   std::vector<ScanEdge> edges;
   edges.reserve(3 * scan.triangles.size());
   for (const auto& [a, b, c] : scan.triangles)
@@ -76,7 +77,7 @@ class ScanTarget {
       : scan_(scan),
         mesh_(scene::mesh_of(scan)),
         index_(mesh_),
-        at_edge_(vertices_at_edges(scan)),
+        near_edge_(vertices_near_edges(scan)),
         states_noise_(states_noise(scan)) {}
 
   struct Met {
@@ -112,9 +113,9 @@ class ScanTarget {
     return index_.nearest(p, within, &against, k_line_facing).has_value();
   }
 
-  bool is_at_edge(std::size_t triangle) const {
+  bool is_near_edge(std::size_t triangle) const {
     const auto& [a, b, c] = scan_.triangles[triangle];
-    return at_edge_[a] || at_edge_[b] || at_edge_[c];
+    return near_edge_[a] || near_edge_[b] || near_edge_[c];
   }
 
   // The mean of the corners' standard deviations along the scan's normal; 1 m where none are stated.
@@ -134,7 +135,7 @@ class ScanTarget {
   const scene::ScanSurface& scan_;
   scene::Mesh mesh_;
   scene::MeshBvh index_;
-  std::vector<bool> at_edge_;
+  std::vector<bool> near_edge_;
   bool states_noise_;
 };
 
@@ -159,7 +160,7 @@ Status compare_along_normals(const ScanTarget& target,
         const Vector3d p = world_from_prototype * out->cad.surface.positions[i].cast<double>();
         const Vector3d n = world_from_prototype.rotation * out->cad.surface.normals[i].cast<double>();
         const auto met = target.meet(p, n, k_beyond_reaches * out->reach_m);
-        if (!met || target.is_at_edge(met->triangle)) {
+        if (!met || target.is_near_edge(met->triangle)) {
           faces_away[i] = !met && target.faces_away(p, n, out->tolerance_m);
           continue;
         }
@@ -238,7 +239,7 @@ class Neighbourhood {
   std::unordered_map<std::uint64_t, std::vector<std::uint32_t>> cells_;
 };
 
-constexpr double k_around = 8, k_inside = 2;  // radii of the neighbourhood, in spacings
+constexpr double k_around = 5, k_inside = 2;  // radii of the neighbourhood, in spacings
 
 // How many stated standard deviations the distances scatter about their neighbourhood. Steps and the slopes
 // of real deviations are far off it and do not count.

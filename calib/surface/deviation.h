@@ -64,7 +64,7 @@ struct Deviation {
 
 /// Compares the scan with the CAD at the registration's pose. From every point of the CAD it looks along the
 /// normal for the scan's surface that faces the same way; nothing is extrapolated beyond the scan's
-/// triangles, and those at its edges are not used. Errors: a scan without triangles, nothing of it near the
+/// triangles, and those near its edges are not used. Errors: a scan without triangles, nothing of it near the
 /// CAD.
 Result<Deviation> deviation(const scene::Mesh& cad,
                             const scene::ScanSurface& scan,

@@ -25,7 +25,7 @@ constexpr double k_around_m = 0.1;
 constexpr double k_start_reach_m = 0.015;
 // A marker's plate: the white margin as a share of the marker's side, the clay that its edge hides, and how
 // far the clay is in front of the marker or behind it.
-constexpr double k_paper = 0.15, k_plate_edge_m = 1e-3, k_plate_m = 10e-3;
+constexpr double k_paper = 0.15, k_plate_edge_m = 3e-3, k_plate_m = 10e-3;
 // With inverse patterns: the standard deviations then say how large the errors are.
 constexpr auto k_code = calib::PatternCode::gray;
 

@@ -11,7 +11,7 @@ namespace {
 using Neighbours = std::vector<std::vector<std::uint32_t>>;
 
 constexpr std::size_t k_most_points = 60;
-constexpr int k_rounds = 40;  // of averaging, until the values of a gap are smooth
+constexpr int k_rounds = 40;  // averages until a gap is smooth
 
 bool is_certain(const calib::Deviation& comparison, std::size_t i) {
   return comparison.states[i] == calib::DeviationState::measured;
@@ -71,9 +71,9 @@ calib::Deviation with_small_gaps_bridged(calib::Deviation comparison) {
   for (std::uint32_t seed = 0; seed < seen.size(); ++seed) {
     if (seen[seed] || is_certain(comparison, seed)) continue;
     const std::vector<std::uint32_t> gap = gap_around(seed, comparison, neighbours, &seen);
-    const bool is_a_gap = std::ranges::all_of(
-        gap, [&](std::uint32_t i) { return comparison.states[i] == calib::DeviationState::not_measured; });
-    if (gap.size() <= k_most_points && is_a_gap) bridge(gap, neighbours, &comparison);
+    const bool is_hidden = std::ranges::any_of(
+        gap, [&](std::uint32_t i) { return comparison.states[i] == calib::DeviationState::beyond_reach; });
+    if (gap.size() <= k_most_points && !is_hidden) bridge(gap, neighbours, &comparison);
   }
   return comparison;
 }

@@ -50,7 +50,6 @@ TEST(SmallGaps, AreBridgedSmoothly) {
   comparison.stddevs_m[point(9, 12)] = 3e-5f;
   comparison.states[point(12, 17)] = calib::DeviationState::uncertain;
   comparison.distances_m[point(12, 17)] = 4e-4f;
-  comparison.stddevs_m[point(12, 17)] = 3e-4f;
   const calib::Deviation bridged = with_small_gaps_bridged(comparison);
   for (int y = 12; y < 17; ++y)
     for (int x = 10; x < 15; ++x) {
