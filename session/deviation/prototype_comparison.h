@@ -38,6 +38,7 @@ struct SeenMarker {
   Pose world_from_marker;
   double size_m = 0;
 };
+/// Those of the bodies that are measured now.
 std::vector<SeenMarker> seen_markers(std::span<const Body> bodies, std::span<const Track> tracks);
 
 /// A prototype that was scanned in place.
