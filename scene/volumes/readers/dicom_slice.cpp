@@ -14,6 +14,7 @@
 #include <cstring>
 
 #include "core/utf8.h"
+#include "scene/volumes/readers/dcmtk_versions.h"
 #include "scene/volumes/readers/dicom_file.h"
 #include "scene/volumes/readers/jpeg_size.h"
 
@@ -231,8 +232,8 @@ Status DicomValues::read(const DicomSlice& slice, float* values) {
   file.frame.resize(bytes + bytes % 2);
   Uint32 stated = 0;
   OFString colours;
-  const bool is_encoded = DcmXfer(file.syntax).isEncapsulated();
-  if (file.pixels->getUncompressedFrameSize(data, stated).bad() || stated != bytes ||
+  const bool is_encoded = uses_encapsulated_format(DcmXfer(file.syntax));
+  if (uncompressed_frame_size(*file.pixels, data, !is_encoded, &stated).bad() || stated != bytes ||
       file.pixels
           ->getUncompressedFrame(data, static_cast<Uint32>(slice.frame), file.fragment, file.frame.data(),
                                  static_cast<Uint32>(file.frame.size()), colours, &file.cache)
