@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <tuple>
 #include <unordered_map>
 
 #include "core/median.h"
@@ -288,6 +290,33 @@ void add_registration(const Registration& registration, const Neighbourhood& aro
   out->stddevs_m = std::move(sums);
 }
 
+// The points that share a triangle with each point, or its place: where a CAD has an edge or a seam, or its
+// triangles share nothing, several points lie at one place.
+std::vector<std::vector<std::uint32_t>> neighbours_of(const scene::ScanSurface& surface) {
+  const std::size_t count = surface.positions.size();
+  std::vector<std::vector<std::uint32_t>> of(count);
+  for (const auto& [a, b, c] : surface.triangles) {
+    of[a].insert(of[a].end(), {b, c});
+    of[b].insert(of[b].end(), {a, c});
+    of[c].insert(of[c].end(), {a, b});
+  }
+  std::vector<std::uint32_t> by_place(count);
+  std::iota(by_place.begin(), by_place.end(), 0U);
+  const auto place = [&](std::uint32_t i) {
+    const Vector3f& p = surface.positions[i];
+    return std::tuple(p.x(), p.y(), p.z());
+  };
+  std::sort(by_place.begin(), by_place.end(),
+            [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
+  for (std::size_t k = 1; k < count; ++k) {
+    const std::uint32_t a = by_place[k - 1], b = by_place[k];
+    if (place(a) != place(b)) continue;
+    of[a].push_back(b);
+    of[b].push_back(a);
+  }
+  return of;
+}
+
 DeviationExtreme extreme_at(const Deviation& deviation, std::size_t i) {
   return {i, deviation.cad.surface.positions[i].cast<double>(), static_cast<double>(deviation.distances_m[i]),
           static_cast<double>(deviation.stddevs_m[i]), static_cast<double>(deviation.cad.areas_m2[i])};
@@ -339,7 +368,7 @@ Result<Deviation> deviation(const scene::Mesh& cad,
 
 std::vector<DeviationExtreme> extremes(const Deviation& deviation, std::size_t most, double least_area_m2) {
   const std::size_t count = deviation.states.size();
-  const auto neighbours = neighbours_of(deviation.cad);
+  const auto neighbours = neighbours_of(deviation.cad.surface);
   // 1: proud, -1: shy of the tolerance; 0: neither, or not certain.
   std::vector<int> side(count, 0);
   for (std::size_t i = 0; i < count; ++i)

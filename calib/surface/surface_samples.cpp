@@ -6,8 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
-#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -246,32 +244,6 @@ SurfaceSamples surface_samples(const scene::Mesh& mesh, double spacing_m, std::s
   out.areas_m2 = areas_at_points(out.surface);
   if (out.surface.positions.size() > most) return merged_samples(out, most);
   return out;
-}
-
-std::vector<std::vector<std::uint32_t>> neighbours_of(const SurfaceSamples& samples) {
-  const scene::ScanSurface& surface = samples.surface;
-  const std::size_t count = surface.positions.size();
-  std::vector<std::vector<std::uint32_t>> of(count);
-  for (const auto& [a, b, c] : surface.triangles) {
-    of[a].insert(of[a].end(), {b, c});
-    of[b].insert(of[b].end(), {a, c});
-    of[c].insert(of[c].end(), {a, b});
-  }
-  std::vector<std::uint32_t> by_place(count);
-  std::iota(by_place.begin(), by_place.end(), 0U);
-  const auto place = [&](std::uint32_t i) {
-    const Vector3f& p = surface.positions[i];
-    return std::tuple(p.x(), p.y(), p.z());
-  };
-  std::sort(by_place.begin(), by_place.end(),
-            [&](std::uint32_t a, std::uint32_t b) { return place(a) < place(b); });
-  for (std::size_t k = 1; k < count; ++k) {
-    const std::uint32_t a = by_place[k - 1], b = by_place[k];
-    if (place(a) != place(b)) continue;
-    of[a].push_back(b);
-    of[b].push_back(a);
-  }
-  return of;
 }
 
 }  // namespace limn::calib

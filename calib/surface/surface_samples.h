@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "scene/meshes/mesh.h"
@@ -25,9 +24,5 @@ double area_of(const scene::Mesh& mesh);
 /// depend on the number of triangles, and every point lies on the mesh. Triangles without an area are left
 /// out.
 SurfaceSamples surface_samples(const scene::Mesh& mesh, double spacing_m, std::size_t most);
-
-/// The points that share a triangle with each point, or its place: where a CAD has an edge or a seam, or its
-/// triangles share nothing, several points lie at one place.
-std::vector<std::vector<std::uint32_t>> neighbours_of(const SurfaceSamples& samples);
 
 }  // namespace limn::calib

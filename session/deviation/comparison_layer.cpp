@@ -8,7 +8,6 @@
 #include "calib/surface/deviation_scale.h"
 #include "core/parallel.h"
 #include "scene/meshes/mesh_bvh.h"
-#include "session/deviation/small_gaps.h"
 
 namespace limn::session {
 namespace {
@@ -55,8 +54,8 @@ scene::Mesh mesh_of(const calib::Deviation& deviation) {
 // Interpolates a comparison anywhere on the CAD.
 class Interpolation {
  public:
-  explicit Interpolation(calib::Deviation deviation)
-      : deviation_(std::move(deviation)), mesh_(mesh_of(deviation_)), index_(mesh_) {}
+  explicit Interpolation(const calib::Deviation& deviation)
+      : deviation_(deviation), mesh_(mesh_of(deviation)), index_(mesh_) {}
 
   // `d_face`: the normal of the CAD's triangle there.
   std::uint32_t at(const Vector3d& p, const Vector3d& d_face) const {
@@ -85,7 +84,7 @@ class Interpolation {
     return {1 - of_b - of_c, of_b, of_c};
   }
 
-  calib::Deviation deviation_;
+  const calib::Deviation& deviation_;
   scene::Mesh mesh_;
   scene::MeshBvh index_;
 };
@@ -126,7 +125,7 @@ scene::DeviationLayer comparison_layer(const scene::Mesh& cad,
   const std::size_t most = std::max(k_most_values, 4 * cad.triangles.size());
   while (points > most) points = divide(cad, spacing_m *= k_coarser, &layer.triangles);
   layer.values.resize(points);
-  const Interpolation values(with_small_gaps_bridged(report.deviation));
+  const Interpolation values(report.deviation);
   constexpr std::size_t k_at_once = 256;
   const std::size_t groups = (cad.triangles.size() + k_at_once - 1) / k_at_once;
   parallel_for(static_cast<int>(groups), [&](int group) {
