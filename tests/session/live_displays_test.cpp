@@ -1,6 +1,8 @@
 // What the displays of a session on devices show.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -27,6 +29,9 @@ namespace {
 namespace fs = std::filesystem;
 using test::Canvas;
 
+constexpr double k_limit_s = 300;  // a session that goes well ends long before
+constexpr int k_lit_bytes = 1000;
+
 // Three screens, as in a devices file; the recording has their names.
 TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   const fs::path folder = test::test_folder();
@@ -52,14 +57,19 @@ TEST(Live, EachScreenShowsWhatWasChosenForIt) {
   devices.projectors.resize(setup.rig.projectors.size());
   devices.projectors[0] =
       std::make_unique<Canvas>(projector.name, cv::Size(projector.width, projector.height));
-  std::vector<const Canvas*> screens;
+  std::vector<Canvas*> screens;
   for (const std::string& name : setup.screens) {
     auto canvas = std::make_unique<Canvas>(name, seen.size());
     screens.push_back(canvas.get());
     devices.screens.push_back(std::move(canvas));
   }
-  const std::atomic<bool> is_ended = false;
-  const Status played = play_on_devices(&devices, 3, is_ended, {*perception, *session, *output});
+  std::atomic<bool> is_ended = false;
+  screens[1]->on_show = [&] {
+    is_ended = !screens[0]->shown.empty() && !screens[2]->shown.empty() &&
+               cv::norm(screens[0]->shown, seen, cv::NORM_INF) == 0 &&
+               cv::norm(screens[1]->shown, seen, cv::NORM_INF) > 50;
+  };
+  const Status played = play_on_devices(&devices, k_limit_s, is_ended, {*perception, *session, *output});
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* screen : screens) ASSERT_FALSE(screen->shown.empty()) << screen->name();
   EXPECT_EQ(cv::norm(screens[0]->shown, seen, cv::NORM_INF), 0);
@@ -93,7 +103,7 @@ TEST(Live, DisplaysInStereoAndWallsShowWhatEachEyeSees) {
   SessionDevices devices;
   devices.cameras.push_back(std::make_unique<device::ImageSequenceCamera>(
       device::ImageSequenceCamera::open(folder / "seen.png", {.repeat = true}).value()));
-  std::vector<const Canvas*> shown;
+  std::vector<Canvas*> shown;
   const auto canvas = [&](const std::string& name, cv::Size size) {
     auto out = std::make_unique<Canvas>(name, size);
     shown.push_back(out.get());
@@ -110,8 +120,11 @@ TEST(Live, DisplaysInStereoAndWallsShowWhatEachEyeSees) {
     return Eigen::Vector3d(world_from_viewer * Eigen::Vector3d(x, y, 0.5));
   };
   devices.walls["wall"] = {through(-0.2, -0.15), through(0.2, -0.15), through(-0.2, 0.15)};
-  const std::atomic<bool> is_ended = false;
-  const Status played = play_on_devices(&devices, 3, is_ended, {*perception, *session, *output});
+  std::atomic<bool> is_ended = false;
+  shown[2]->on_show = [&] {
+    is_ended = std::ranges::all_of(shown, [](const Canvas* one) { return one->most_lit > k_lit_bytes; });
+  };
+  const Status played = play_on_devices(&devices, k_limit_s, is_ended, {*perception, *session, *output});
   ASSERT_TRUE(played) << played.message();
   for (const Canvas* canvas : shown) ASSERT_FALSE(canvas->shown.empty()) << canvas->name();
   const cv::Mat light = shown[0]->shown, wall = shown[1]->shown, desk = shown[2]->shown;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <opencv2/core.hpp>
 #include <string>
 #include <utility>
@@ -21,11 +22,15 @@ class Canvas : public device::Display {
     shown = image.clone();
     ++count;
     most_lit = std::max(most_lit, cv::countNonZero(image.reshape(1)));
+    if (on_show) on_show();
     return shifted(std::chrono::steady_clock::now(), 0.020);
   }
   cv::Mat shown;
   int count = 0;     ///< images shown
   int most_lit = 0;  ///< the largest number of bytes over 0 in an image
+  /// Called after each image, by the thread that shows it. A test of a session ends it here, as soon as it
+  /// has shown what the test looks at: how long that takes depends on the machine.
+  std::function<void()> on_show;
 
  private:
   std::string name_;

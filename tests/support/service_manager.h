@@ -45,8 +45,8 @@ class NotifySocket {
   /// Whether a message that begins so comes within that time. Others before it are dropped.
   bool receives(const std::string& message, double limit_s) const {
     const Stamp until = shifted(now(), limit_s);
-    for (double left_s = limit_s; left_s > 0; left_s = seconds_between(now(), until))
-      if (next(left_s).starts_with(message)) return true;
+    while (now() < until)
+      if (next(seconds_between(now(), until)).starts_with(message)) return true;
     return false;
   }
   /// Drops the messages that have come so far.
