@@ -116,12 +116,9 @@ cv::Mat with_legend(const cv::Mat& image, const scene::DeviationLayer& layer, do
     put_line(calib::band_text(band, tolerance_m), text_at(box.x + 2 * pad + line), 0.55 * scale, &out);
   }
   y += line;
-  const cv::Rect hatched(box.x + pad, y - line + pad / 2, line, line - pad / 2);
-  for (int k = -line; k < line; k += std::max(4, line / 3))
-    cv::line(out, {std::max(hatched.x, hatched.x + k), k < 0 ? hatched.y - k : hatched.y},
-             {std::min(hatched.br().x, hatched.x + k + hatched.height),
-              k + hatched.height > line ? hatched.y + line - k : hatched.br().y},
-             cv::Scalar::all(220), 2, cv::LINE_AA);
+  cv::Mat hatched = out(cv::Rect(box.x + pad, y - line + pad / 2, line, line - pad / 2));
+  for (int x = -line; x < line; x += std::max(4, line / 4))
+    cv::line(hatched, {x, hatched.rows}, {x + hatched.rows, 0}, cv::Scalar::all(220), 1, cv::LINE_AA);
   put_line("uncertain", text_at(box.x + 2 * pad + line), 0.55 * scale, &out);
   if (!layer.unsure.empty()) {
     std::string unsure = "alignment unsure:";

@@ -57,7 +57,7 @@ class CrossSection {
         const std::size_t above = height[i] >= 0 ? i : next, below = height[i] >= 0 ? next : i;
         const Vector3d at =
             p[above] + height[above] / (height[above] - height[below]) * (p[below] - p[above]);
-        (above == i ? side.from : side.to) = {d_x_.dot(at), d_y_.dot(at)};
+        (above == i ? side.from : side.to) = Eigen::Vector2d(d_x_.dot(at), d_y_.dot(at));
         ++crossings;
       }
       if (crossings == 2) sides_.push_back(side);
