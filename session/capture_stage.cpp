@@ -47,7 +47,8 @@ void CaptureStage::step(const FrameClock& clock) {
   if (!job_) return begin_requested(clock.now());
   if (holds_light()) job_->port().serve(k_task_wait);
   job_->show_progress(job_->port().words(), session_);
-  if (job_->is_computed() && job_->is_ready(*session_, clock.now())) {
+  const bool is_ready = !job_->port().is_capturing() && job_->is_ready(*session_, clock.now());
+  if (is_ready && job_->is_computed()) {
     pause();
     job_->show_progress({}, session_);
     job_->apply(clock.now(), perception_, session_);

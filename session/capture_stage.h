@@ -34,7 +34,7 @@ class CaptureJob {
   /// Whether the computation has ended.
   virtual bool is_computed() const = 0;
   /// Whether the result may be applied: it may need a look at what the cameras see after the capture. Called
-  /// in each turn of the loop once it is computed.
+  /// in each turn of the loop once the capture has ended.
   virtual bool is_ready(const Session& session, Stamp now) = 0;
   /// Applies the result. Perception is paused.
   virtual void apply(Stamp at, Perception* perception, Session* session) = 0;

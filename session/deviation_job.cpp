@@ -20,8 +20,9 @@ namespace fs = std::filesystem;
 constexpr double k_still_m = 1e-3, k_still_rad = 0.3 * M_PI / 180;
 // A part that moved by less has not changed what is scanned.
 constexpr double k_part_still_m = 2e-3;
-// How long after the capture a tracked pose is waited for.
-constexpr double k_wait_s = 2;
+// How long after the capture a tracked pose is waited for, and from when on it is used: the filter has
+// settled.
+constexpr double k_wait_s = 2, k_settled_s = 0.2;
 
 using Compared = std::shared_ptr<const PrototypeComparison>;
 
@@ -31,14 +32,21 @@ const Track* tracked(std::span<const Track> tracks, const std::string& body) {
   return nullptr;
 }
 
+// Three standard deviations of the difference of two poses; first: 0 rotation, 3 translation.
+double scatter_of(const Track& before, const Track& after, int first) {
+  return 3 * std::sqrt(before.covariance.diagonal().segment<3>(first).maxCoeff() +
+                       after.covariance.diagonal().segment<3>(first).maxCoeff());
+}
+
+bool has_shifted(const Track& before, const Track& after, double still_m) {
+  return (before.world_from_body.translation - after.world_from_body.translation).norm() >
+         still_m + scatter_of(before, after, 3);
+}
+
 bool has_moved(const Track& before, const Track& after) {
-  const auto stddev = [&](int first) {
-    return std::sqrt(before.covariance.diagonal().segment<3>(first).maxCoeff() +
-                     after.covariance.diagonal().segment<3>(first).maxCoeff());
-  };
-  const Pose &a = before.world_from_body, &b = after.world_from_body;
-  return (a.translation - b.translation).norm() > k_still_m + 3 * stddev(3) ||
-         angle_between(a.rotation, b.rotation) > k_still_rad + 3 * stddev(0);
+  return has_shifted(before, after, k_still_m) ||
+         angle_between(before.world_from_body.rotation, after.world_from_body.rotation) >
+             k_still_rad + scatter_of(before, after, 0);
 }
 
 // The bodies whose tracks moved, apart from the prototype.
@@ -46,11 +54,9 @@ std::string moved_parts(std::span<const Track> before, std::span<const Track> af
   std::string names;
   for (const Track& track : before) {
     if (track.body == "prototype" || track.tracking != TrackingState::measured) continue;
-    const Track* now = tracked(after, track.body);
-    if (!now ||
-        (now->world_from_body.translation - track.world_from_body.translation).norm() <= k_part_still_m)
-      continue;
-    names += (names.empty() ? "" : ", ") + track.body;
+    const Track* later = tracked(after, track.body);
+    if (later && has_shifted(track, *later, k_part_still_m))
+      names += (names.empty() ? "" : ", ") + track.body;
   }
   return names;
 }
@@ -117,17 +123,17 @@ class ComparisonJob : public CaptureJob {
 
  protected:
   // Whether the result may be used, now that it is known.
-  virtual Status check(const Session&) { return {}; }
+  virtual Status check() { return {}; }
   // The parts that moved during the scan.
-  virtual std::string moved(const Session&) { return {}; }
+  virtual std::string moved() { return {}; }
 
  private:
   Status applied(const Result<Compared>& compared, Session* session, Stamp at) {
     if (!compared) return compared.error();
     if (scenes_ != session->scenes())
       return error("expected the scene and the rig to stay as they were, found others now. Scan again.");
-    LIMN_TRY_STATUS(check(*session));
-    const std::string what = sentence(**compared, moved(*session));
+    LIMN_TRY_STATUS(check());
+    const std::string what = sentence(**compared, moved());
     session->deviation().result = *compared;
     session->deviation().text = what.substr(what.find(' ') + 1);
     session->show_deviation((*compared)->layer);
@@ -145,17 +151,19 @@ class ScanJob final : public ComparisonJob {
   ScanJob(int scenes, std::unique_ptr<Task> task, ImageFolder images, std::vector<Track> before)
       : ComparisonJob(scenes, std::move(task), std::move(images)), before_(std::move(before)) {}
 
+  // Takes the poses soon after the capture: while the result is computed, people may move things again.
   bool is_ready(const Session& session, Stamp now) override {
     if (!ended_at_) ended_at_ = std::max(now, session.percepts().captured_at);
-    if (session.percepts().captured_at > *ended_at_ && tracked(session.prediction().at_capture, "prototype"))
-      return true;
-    return seconds_between(*ended_at_, now) > k_wait_s;
+    if (after_.empty() && session.percepts().captured_at > shifted(*ended_at_, k_settled_s) &&
+        tracked(session.prediction().at_capture, "prototype"))
+      after_ = session.prediction().at_capture;
+    return !after_.empty() || seconds_between(*ended_at_, now) > k_wait_s;
   }
 
  private:
-  Status check(const Session& session) override {
+  Status check() override {
     const Track* before = tracked(before_, "prototype");
-    const Track* after = tracked(session.prediction().at_capture, "prototype");
+    const Track* after = tracked(after_, "prototype");
     if (!after)
       return error(
           "expected the prototype to be tracked after the scan, found it lost: it may have moved. Let the "
@@ -169,11 +177,9 @@ class ScanJob final : public ComparisonJob {
     return {};
   }
 
-  std::string moved(const Session& session) override {
-    return moved_parts(before_, session.prediction().at_capture);
-  }
+  std::string moved() override { return moved_parts(before_, after_); }
 
-  std::vector<Track> before_;
+  std::vector<Track> before_, after_;
   std::optional<Stamp> ended_at_;
 };
 

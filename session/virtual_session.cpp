@@ -336,11 +336,12 @@ class VirtualSink final : public FrameSink {
   std::vector<std::size_t> projectors_;  // in health_
 };
 
-// The clock runs while patterns are shown and stands still while the result is computed; the room does not
-// change.
+// The clock runs while patterns are shown; the room does not change meanwhile. Without real time it stands
+// still while the result is computed, so that a session comes out the same on every machine.
 class VirtualCapture final : public CaptureDevices {
  public:
-  VirtualCapture(sim::VirtualRig* rig, VirtualSource* source) : rig_(rig), source_(source) {}
+  VirtualCapture(sim::VirtualRig* rig, VirtualSource* source, bool is_real_time)
+      : rig_(rig), source_(source), is_real_time_(is_real_time) {}
 
   wizard::WizardBackend backend(ImageWriter* writer) override {
     wizard::WizardBackend out = wizard::virtual_backend(no_board_, rig_, writer);
@@ -350,11 +351,12 @@ class VirtualCapture final : public CaptureDevices {
   }
   void pause_perception(Session*) override { source_->pause(true); }
   void resume_perception() override { source_->pause(false); }
-  bool waits_for_result() const override { return true; }
+  bool waits_for_result() const override { return !is_real_time_; }
 
  private:
   sim::VirtualRig* rig_;
   VirtualSource* source_;
+  bool is_real_time_;
   const wizard::Plan no_board_{};
 };
 
@@ -374,7 +376,7 @@ Status play(double end_s,
   VirtualSource source(end_s, kept, rig, room, &parts.perception, parts.output.recorder(), parts.feeds,
                        &health);
   VirtualSink sink(rig, room, &parts.session, &health, kept);
-  VirtualCapture capture(rig, &source);
+  VirtualCapture capture(rig, &source, real_time != nullptr);
   SceneFilesClient files(parts.session.setup().scene.folder);
   SessionParts with_own = parts;
   with_own.clients.insert(with_own.clients.begin(), &files);
