@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/json_text.h"
 #include "remote/api/responses.h"
@@ -71,8 +72,9 @@ void RoomImagePublisher::draw_image(Clock::time_point now) {
 void RoomImagePublisher::receive_image(CompositeImage image) {
   is_drawing_ = false;
   image_came_at_ = Clock::now();
-  const auto took = image_came_at_ - drawing_since_;
-  next_image_at_ = drawing_since_ + std::max<Clock::duration>(k_room_interval, k_room_rest_factor * took);
+  const Clock::duration took = image_came_at_ - drawing_since_,
+                        lasting = std::min(took, std::exchange(last_took_, took));
+  next_image_at_ = drawing_since_ + std::max<Clock::duration>(k_room_interval, k_room_rest_factor * lasting);
   if (!message_ || image.jpeg != image_.jpeg || image.json != image_.json) {
     message_ = std::make_shared<const std::string>(
         image_message(ImageKind::room, ++number_, image.json, image.jpeg));

@@ -18,8 +18,10 @@ namespace limn::remote {
 
 /// The shortest time between two images of the room.
 constexpr std::chrono::milliseconds k_room_interval{66};
-/// After an image of the room no other one is drawn for this multiple of its drawing time, so that projectors
-/// are drawn first, even where one processor draws everything.
+/// After an image of the room no other one is drawn for this multiple of the drawing time, so that projectors
+/// are drawn first, even where one processor draws everything. That time is the shorter one of the last two:
+/// a single long one, for which a program was linked or projectors showed patterns, says nothing about the
+/// next.
 constexpr int k_room_rest_factor = 8;
 /// During that rest a new client gets the last image, if it is at most this old; otherwise one is drawn at
 /// once.
@@ -66,6 +68,7 @@ class RoomImagePublisher {
 
   bool is_drawing_ = false;
   Clock::time_point drawing_since_, image_came_at_, next_image_at_;
+  Clock::duration last_took_{};                 // for the last image
   CompositeImage image_;                        // the last one
   std::uint32_t number_ = 0;                    // its number
   ShownImages shown_;                           // by their numbers
