@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
+#include <utility>
 
 #include "calib/surface/deviation_scale.h"
 #include "core/imager.h"
@@ -115,18 +116,17 @@ class ViewCanvas {
            corner.inverse_depth > (1 - k_same_depth) * nearest_.at<double>(px);
   }
 
-  // The part with the CAD, and a margin with room for words.
-  cv::Mat cropped() const {
+  // Where the CAD is, with a margin.
+  cv::Rect box() const {
     constexpr int k_margin_px = 40;
     const cv::Rect whole({}, image_.size()), box = cv::boundingRect(nearest_ > 0);
-    return image_(cv::Rect(box.tl() - cv::Point(k_margin_px, k_margin_px),
-                           box.br() + cv::Point(k_margin_px, k_margin_px)) &
-                  whole)
-        .clone();
+    return cv::Rect(box.tl() - cv::Point(k_margin_px, k_margin_px),
+                    box.br() + cv::Point(k_margin_px, k_margin_px)) &
+           whole;
   }
 
   const Vector2d& px(std::size_t i) const { return corners_[i].px; }
-  cv::Mat& image() { return image_; }
+  const cv::Mat& image() const { return image_; }
 
  private:
   // The colour at a place of a triangle: `at` is the corner with the largest weight.
@@ -193,7 +193,8 @@ void mark(cv::Mat& image, const Vector2d& px, std::size_t number, double distanc
   constexpr double k_size = 0.9;
   const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, k_size, 2, nullptr);
   const bool is_left = at.x + 24 + size.width > image.cols;
-  const cv::Point foot(is_left ? at.x - 20 - size.width : at.x + 20, std::max(at.y - 12, size.height + 4));
+  const cv::Point foot(is_left ? std::max(4, at.x - 20 - size.width) : at.x + 20,
+                       std::max(at.y - 12, size.height + 4));
   const cv::Scalar white(255, 255, 255), ink(25, 22, 20);
   for (const auto& [colour, wider] : {std::pair{white, 4}, std::pair{ink, 0}}) {
     cv::circle(image, at, 12, colour, 2 + wider, cv::LINE_AA);
@@ -215,10 +216,12 @@ std::vector<DeviationView> deviation_views(const Deviation& deviation,
     const Vector3d up = std::abs(d.y()) < 0.9 ? Vector3d::UnitY() : Vector3d::UnitZ();
     ViewCanvas canvas(deviation, scene::preview_viewer(measured, d, up, width, height));
     canvas.draw();
+    const cv::Rect box = canvas.box();
+    cv::Mat image = canvas.image()(box).clone();
     for (std::size_t k = 0; k < extremes.size(); ++k)
       if (canvas.is_visible(extremes[k].sample))
-        mark(canvas.image(), canvas.px(extremes[k].sample), k + 1, extremes[k].distance_m);
-    views.push_back({side_text(d), canvas.cropped()});
+        mark(image, canvas.px(extremes[k].sample) - Vector2d(box.x, box.y), k + 1, extremes[k].distance_m);
+    views.push_back({side_text(d), std::move(image)});
   }
   return views;
 }

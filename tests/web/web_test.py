@@ -23,6 +23,7 @@ from browser import ENTER, ESCAPE, TAB, WAIT_S, Browser, Driver, Failed, wait_fo
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 CONFIG = os.path.join(HERE, "..", "..", "config")
+START_S = 180  # longest start of a session, whose OpenGL programs a software driver compiles for the first time
 PHONE, DESK = "phone", "desk"
 SIZES = {PHONE: (390, 844, True), "tablet": (820, 1180, True), "tablet-lying": (1180, 820, True), DESK: (1440, 900, False)}
 MOST_BYTES, MOST_READY_MS, MOST_HEARD_MS = 300_000, 1000, 200
@@ -71,8 +72,12 @@ class Live:
         with open(self.log_path, "w") as log:
             self.process = subprocess.Popen(
                 [limn, "live", "--serve", serve, "--world", world, "--resolution", "0.25"], env=environment, stdout=log, stderr=log)
-        self.url = wait_for("the remote's address", lambda: self._told(r"the remote is at (\S+)/"), 60)[0]
-        pins = wait_for("the PINs", lambda: self._told(r"look (\d{6}), work (\d{6}), operate (\d{6})"))
+        try:
+            self.url = wait_for("the remote's address", lambda: self._told(r"the remote is at (\S+)/"), START_S)[0]
+            pins = wait_for("the PINs", lambda: self._told(r"look (\d{6}), work (\d{6}), operate (\d{6})"))
+        except Failed:
+            self.close()
+            raise
         self.pins = dict(zip(["look", "work", "operate"], pins))
 
     def _told(self, pattern):
@@ -85,7 +90,10 @@ class Live:
 
     def close(self):
         self.process.terminate()
-        self.process.wait(30)
+        try:
+            self.process.wait(30)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
 
 
 CHECKS = []
