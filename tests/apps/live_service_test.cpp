@@ -8,7 +8,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <memory>
@@ -92,30 +91,28 @@ class Manager : public test::NotifySocket {
 
 TEST(LiveService, IsBackWithLightAfterItWasKilled) {
   constexpr double k_restart_s = 1;  // RestartSec of tools/install/limn-live.service.in
-  constexpr double k_limit_s = 5, k_wait_s = 120;
+  constexpr double k_limit_s = 5;
   Manager manager(test::test_folder());
-  const Stamp begun = now();
   manager.start();
-  ASSERT_TRUE(manager.receives("READY=1", k_wait_s)) << manager.journal();
-  const double first_s = seconds_between(begun, now());
-  EXPECT_TRUE(manager.receives("WATCHDOG=1", k_wait_s));
+  ASSERT_TRUE(manager.receives("READY=1", 20)) << manager.journal();
+  EXPECT_TRUE(manager.receives("WATCHDOG=1", 2));
 
   ASSERT_EQ(manager.stop(SIGKILL), -SIGKILL);
   manager.forget();
   const Stamp killed = now();
   manager.start();
-  ASSERT_TRUE(manager.receives("READY=1", k_wait_s)) << manager.journal();
+  ASSERT_TRUE(manager.receives("READY=1", 20)) << manager.journal();
   const double light_s = seconds_between(killed, now());
   RecordProperty("light_s", std::to_string(light_s));
-  EXPECT_LT(light_s + k_restart_s, std::max(k_limit_s, 2 * first_s)) << "on a busy machine, twice the start";
+  EXPECT_LT(light_s + k_restart_s, k_limit_s);
 
-  EXPECT_TRUE(manager.receives("WATCHDOG=1", k_wait_s));
+  EXPECT_TRUE(manager.receives("WATCHDOG=1", 2));
   manager.send(SIGSTOP);  // a loop that hangs
   usleep(100'000);
   manager.forget();
   EXPECT_FALSE(manager.receives("WATCHDOG=1", 1));
   manager.send(SIGCONT);
-  EXPECT_TRUE(manager.receives("WATCHDOG=1", k_wait_s));
+  EXPECT_TRUE(manager.receives("WATCHDOG=1", 2));
 
   EXPECT_EQ(manager.stop(SIGTERM), 0);
   EXPECT_TRUE(manager.receives("STOPPING=1", 1));
