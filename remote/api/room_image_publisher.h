@@ -68,7 +68,8 @@ class RoomImagePublisher {
 
   bool is_drawing_ = false;
   Clock::time_point drawing_since_, image_came_at_, next_image_at_;
-  Clock::duration last_took_{};                 // for the last image
+  // For the last image. Before the first one: such that no first image rests longer than images last.
+  Clock::duration last_took_ = Clock::duration(k_room_image_lasts) / k_room_rest_factor;
   CompositeImage image_;                        // the last one
   std::uint32_t number_ = 0;                    // its number
   ShownImages shown_;                           // by their numbers

@@ -203,7 +203,7 @@ TEST_F(AReception, GivesANewcomerTheLastRoomImageWhileItRests) {
 TEST_F(AReception, DrawsForANewcomerAtOnceWhatIsLongAgo) {
   const auto first = client(Role::look);
   first->receive_text(k_wants_room);
-  draw('a', 600ms);  // and then it rests for 4.2 s
+  draw('a', 600ms);  // and then it rests for 2.4 s
   first->close();
   std::this_thread::sleep_for(k_room_image_lasts + 100ms);
   const auto second = client(Role::look);
