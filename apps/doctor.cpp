@@ -219,7 +219,9 @@ Findings cameras(const device::Devices& devices) {
     if (!found.problem.empty()) findings.push_back(failed("cameras", found.path, found.problem));
     if (found.problem.empty()) findings.push_back(tested("cameras", {.name = found.card, .source = source}));
   }
-  for (const std::string& id : device::gige_cameras())
+  const auto on_network = device::gige_cameras();
+  if (!on_network) findings.push_back(failed("cameras", "gige", on_network.message()));
+  for (const std::string& id : on_network ? *on_network : std::vector<std::string>{})
     if (!named(fmt::format("gige:{}", id)))
       findings.push_back({"cameras", id, State::note, fmt::format("answers as gige:{}", id), ""});
   if (findings.empty() && devices.cameras.empty())

@@ -71,7 +71,7 @@ class StderrCapture {
   int saved_ = -1;
 };
 
-ModelPointer to_mrcal(const Imager& imager) {
+ModelPointer to_mrcal(const Imager& imager, const MrcalFunctions& mrcal) {
   const std::size_t bytes = sizeof(mrcal_cameramodel_t) + imager.lens.values.size() * sizeof(double);
   ModelPointer model(static_cast<mrcal_cameramodel_t*>(std::calloc(1, bytes)));
   LIMN_CHECK(model != nullptr);
@@ -81,7 +81,7 @@ ModelPointer to_mrcal(const Imager& imager) {
   std::memcpy(model->rt_cam_ref, rt, sizeof rt);
   model->imagersize[0] = static_cast<unsigned>(imager.width);
   model->imagersize[1] = static_cast<unsigned>(imager.height);
-  LIMN_CHECK(mrcal_lensmodel_from_name(&model->lensmodel, imager.lens.model.name().c_str()));
+  LIMN_CHECK(mrcal.lensmodel_from_name(&model->lensmodel, imager.lens.model.name().c_str()));
   std::memcpy(model->intrinsics, imager.lens.values.data(), imager.lens.values.size() * sizeof(double));
   return model;
 }
@@ -238,11 +238,13 @@ Result<Imager> load_cameramodel(const fs::path& path) {
 }
 
 Status save_cameramodel(const Imager& imager, const fs::path& path) {
+  LIMN_TRY(const MrcalFunctions* mrcal, mrcal_functions());
   // mrcal does not report a full disk. So it writes to a file in memory, whose content is then written here.
   const int memory = ::memfd_create("limn-cameramodel", MFD_CLOEXEC);
   const fs::path aside = fmt::format("/proc/self/fd/{}", memory);
   StderrCapture complaint;
-  const bool written = memory >= 0 && mrcal_write_cameramodel_file(aside.c_str(), to_mrcal(imager).get());
+  const bool written =
+      memory >= 0 && mrcal->write_cameramodel_file(aside.c_str(), to_mrcal(imager, *mrcal).get());
   const auto text = read_file(aside);
   ::close(memory);
   if (!written || !text || text->find("imagersize") == std::string::npos) {

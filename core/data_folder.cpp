@@ -1,5 +1,7 @@
 #include "core/data_folder.h"
 
+#include <dlfcn.h>
+
 #include <algorithm>
 #include <cctype>
 #include <cstdlib>
@@ -14,12 +16,21 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char *k_variable = "LIMN_DATA", *k_stamp = "version";
+constexpr const char* k_libraries = "liblimn";  // the folder of further libraries beside liblimn.so
 // CMake writes this file into the build folder. Its content is the source tree's path.
 constexpr const char* k_source_tree = "limn-source-tree";
 
 fs::path own_program() {
   std::error_code ignored;
   return fs::read_symlink("/proc/self/exe", ignored);
+}
+
+// The file that this code is in: the program, or liblimn.so.
+fs::path own_file() {
+  Dl_info info{};
+  std::error_code ignored;
+  if (!dladdr(reinterpret_cast<const void*>(&own_file), &info) || !info.dli_fname) return {};
+  return fs::canonical(info.dli_fname, ignored);
 }
 
 std::string trimmed(std::string text) {
@@ -89,6 +100,9 @@ fs::path private_library(std::string_view name) {
   const fs::path program = own_program();
   std::error_code ignored;
   if (const fs::path beside = program.parent_path() / name; fs::exists(beside, ignored)) return beside;
+  if (const fs::path own = own_file(); own != program)
+    for (const fs::path& folder : {own.parent_path(), own.parent_path() / k_libraries})
+      if (fs::exists(folder / name, ignored)) return folder / name;
   if (const auto build = build_folder_of(program)) return *build / name;
   return (program.parent_path() / LIMN_LIBRARIES_FROM_PROGRAM / name).lexically_normal();
 }

@@ -16,9 +16,9 @@ namespace limn {
 /// Errors: there is no such folder; it has no stamp (`version`), or that of another version of Limn.
 Result<std::filesystem::path> data_file(std::string_view relative);
 
-/// Where a shared library that comes with Limn is expected: beside the program, in the build folder that the
-/// program is in, else in Limn's folder for libraries, seen from the program (../lib/limn or
-/// ../lib/MACHINE/limn).
+/// Where a shared library that comes with Limn is expected: beside the program; where this code is in
+/// liblimn.so, beside that or in the folder liblimn/ beside it; in the build folder that the program is in;
+/// else in Limn's folder for libraries, seen from the program (../lib/limn or ../lib/MACHINE/limn).
 std::filesystem::path private_library(std::string_view name);
 
 /// Whether the program is in a build folder, so that it reads the source tree unless LIMN_DATA names another

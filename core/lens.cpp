@@ -13,6 +13,7 @@ namespace limn {
 
 struct LensModel::Impl {
   std::string name;
+  const MrcalFunctions* mrcal = nullptr;
   mrcal_lensmodel_t model{};
   int value_count = 0;
   bool projects_behind = false;
@@ -36,11 +37,11 @@ struct LensModel::Impl {
     auto* gradients = reinterpret_cast<mrcal_point3_t*>(d_px_d_p);
     const int count = static_cast<int>(p.size());
     if (!gradients || d_px_d_values)
-      return mrcal_project(pixels, gradients, d_px_d_values, points, count, &model, values.data());
+      return mrcal->project(pixels, gradients, d_px_d_values, points, count, &model, values.data());
     for (int i = 0; i < count; ++i) {
       if (model.type == MRCAL_LENSMODEL_PINHOLE)
-        mrcal_project_pinhole(pixels + i, gradients + 2 * i, points + i, 1, values.data());
-      else if (!mrcal_project(pixels + i, gradients + 2 * i, nullptr, points + i, 1, &model, values.data()))
+        mrcal->project_pinhole(pixels + i, gradients + 2 * i, points + i, 1, values.data());
+      else if (!mrcal->project(pixels + i, gradients + 2 * i, nullptr, points + i, 1, &model, values.data()))
         return false;
     }
     return true;
@@ -146,12 +147,14 @@ Result<LensModel> LensModel::parse(const std::string& name) {
       "LENSMODEL_OPENCV5, LENSMODEL_OPENCV8, LENSMODEL_OPENCV12 or "
       "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=18_fov_x_deg=100.",
       name);
-  if (!mrcal_lensmodel_type_is_valid(mrcal_lensmodel_type_from_name(name.c_str()))) return unknown;
-  if (!mrcal_lensmodel_from_name(&impl->model, name.c_str()) || !has_sound_grid(impl->model)) return unknown;
-  const mrcal_lensmodel_metadata_t metadata = mrcal_lensmodel_metadata(&impl->model);
+  LIMN_TRY(const MrcalFunctions* mrcal, mrcal_functions());
+  if (!mrcal_lensmodel_type_is_valid(mrcal->lensmodel_type_from_name(name.c_str()))) return unknown;
+  if (!mrcal->lensmodel_from_name(&impl->model, name.c_str()) || !has_sound_grid(impl->model)) return unknown;
+  impl->mrcal = mrcal;
+  const mrcal_lensmodel_metadata_t metadata = mrcal->lensmodel_metadata(&impl->model);
   if (!metadata.has_core || !metadata.has_gradients) return unknown;
   impl->projects_behind = metadata.can_project_behind_camera;
-  impl->value_count = mrcal_lensmodel_num_params(&impl->model);
+  impl->value_count = mrcal->lensmodel_num_params(&impl->model);
   return LensModel(std::move(impl));
 }
 
@@ -198,7 +201,7 @@ bool LensModel::unproject(std::span<const double> values,
   // mrcal's own search is many times slower, but finds directions far from the start.
   const mrcal_point2_t pixel{.xy = {px.x(), px.y()}};
   mrcal_point3_t direction{};
-  if (!mrcal_unproject(&direction, &pixel, 1, &impl_->model, values.data())) return false;
+  if (!impl_->mrcal->unproject(&direction, &pixel, 1, &impl_->model, values.data())) return false;
   *d_imager = Eigen::Vector3d(direction.x, direction.y, direction.z).normalized();
   return d_imager->allFinite();
 }

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <memory>
+#include <string>
 #include <vector>
 
+#include "core/result.h"
 #include "device/camera_source.h"
 #include "device/sensor_settings.h"
 
@@ -16,34 +18,20 @@ struct GigeCameraOptions {
   double limit_s = 2;          ///< next() returns within this time; after a search up to 1 s later.
 };
 
-/// An industrial camera (GigE Vision, also USB3 Vision) through Aravis, with Mono8, 8-bit Bayer, RGB8 or
-/// BGR8. `captured_at` is the arrival of a frame's first packet, as recorded by Aravis' own thread, minus
-/// half the exposure. Of several waiting frames only the newest is decoded. After Aravis has released a lost
-/// camera, it is searched for again, first after 0.1 s, then at intervals that double up to 2 s. The
-/// destructor waits at most one second for a lost camera.
-class GigeCamera : public CameraSource {
- public:
-  /// `id` is Aravis' name of the camera (`Vendor-Model-Serial`) or its IP address; empty: the first camera
-  /// that answers. Errors: no such camera, another program uses it, no supported format, no frame in time.
-  static Result<GigeCamera> open(const std::string& id, const GigeCameraOptions& options = {});
-  GigeCamera(GigeCamera&&) noexcept;
-  GigeCamera& operator=(GigeCamera&&) noexcept;
-  ~GigeCamera() override;
+/// Opens an industrial camera (GigE Vision, also USB3 Vision) through Aravis, with Mono8, 8-bit Bayer, RGB8
+/// or BGR8. `id` is Aravis' name of the camera (`Vendor-Model-Serial`) or its IP address; empty: the first
+/// camera that answers. Errors: no such camera, another program uses it, no supported format, no frame in
+/// time; the shared library with Aravis (device/gige/) is not there.
+///
+/// `captured_at` is the arrival of a frame's first packet, as recorded by Aravis' own thread, minus half the
+/// exposure. Of several waiting frames only the newest is decoded. After Aravis has released a lost camera,
+/// it is searched for again, first after 0.1 s, then at intervals that double up to 2 s. The destructor waits
+/// at most one second for a lost camera.
+Result<std::unique_ptr<CameraSource>> open_gige_camera(const std::string& id,
+                                                       const GigeCameraOptions& options = {});
 
-  const std::string& name() const override;
-  cv::Size size() const override;
-  Result<Frame> next() override;
-  std::string description() const override;
-  /// The requested settings with the values that the camera then reports.
-  std::vector<CameraSetting> settings() const override;
-
- private:
-  struct Impl;
-  explicit GigeCamera(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
-};
-
-/// Ids of the cameras that answer on the network (and on USB3), after a search of a second.
-std::vector<std::string> gige_cameras();
+/// Ids of the cameras that answer on the network (and on USB3), after a search of a second. Error: the shared
+/// library with Aravis is not there.
+Result<std::vector<std::string>> gige_cameras();
 
 }  // namespace limn::device

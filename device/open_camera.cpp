@@ -58,11 +58,11 @@ Opened opened(const CameraConfig& config) {
                                                        .grey = config.grey,
                                                        .limit_s = config.limit_s}));
   if (source.starts_with("gige:"))
-    return on_heap(GigeCamera::open(source.substr(5), {.name = config.name,
-                                                       .size = config.size,
-                                                       .sensor = config.sensor,
-                                                       .grey = config.grey,
-                                                       .limit_s = config.limit_s}));
+    return open_gige_camera(source.substr(5), {.name = config.name,
+                                               .size = config.size,
+                                               .sensor = config.sensor,
+                                               .grey = config.grey,
+                                               .limit_s = config.limit_s});
   LIMN_TRY_STATUS(without_settings(config));
   if (source.starts_with("http:") || source.starts_with("https:"))
     return on_heap(

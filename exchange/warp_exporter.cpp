@@ -6,8 +6,8 @@
 #include <string>
 
 #include "core/file.h"
-#include "exchange/exr.h"
 #include "exchange/pfm.h"
+#include "scene/files/exr_image.h"
 
 namespace limn::exchange {
 namespace {
@@ -17,12 +17,14 @@ Status write_warps(const ExportJob& job, const ExportOptions& options) {
   for (std::size_t i = 0; i < job.maps.size(); ++i) {
     const std::string name =
         fmt::format("warp-{}.{}", job.rig.projectors[i].name, k_warp_formats.text(options.format));
-    const std::string bytes =
+    const cv::Mat& points = job.maps[i].points;
+    const auto bytes =
         options.format == WarpFormat::pfm
-            ? pfm_bytes(job.maps[i].points)
-            : exr_bytes(job.maps[i].points,
-                        "R, G, B: x, y, z (m) of the prototype's point that the pixel lights; NaN: none");
-    LIMN_TRY_STATUS(write_file(options.warp / name, bytes));
+            ? Result<std::string>(pfm_bytes(points))
+            : scene::encode_exr(
+                  points, "R, G, B: x, y, z (m) of the prototype's point that the pixel lights; NaN: none");
+    if (!bytes) return bytes.error();
+    LIMN_TRY_STATUS(write_file(options.warp / name, *bytes));
   }
   return {};
 }

@@ -22,7 +22,10 @@ std::vector<OfferedDevice> NodeCameras::found() {
   std::vector<OfferedDevice> out;
   for (const device::V4l2Device& found : device::v4l2_cameras())
     if (found.problem.empty()) out.push_back({"v4l2:" + found.path, {}});
-  for (const std::string& id : device::gige_cameras()) out.push_back({"gige:" + id, {}});
+  const auto on_network = device::gige_cameras();
+  if (!on_network) log_warning("{}", on_network.message());
+  if (on_network)
+    for (const std::string& id : *on_network) out.push_back({"gige:" + id, {}});
   return out;
 }
 

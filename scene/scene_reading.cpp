@@ -8,7 +8,7 @@
 #include "core/names.h"
 #include "scene/actions.h"
 #include "scene/marker_file.h"
-#include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_formats.h"
 #include "scene/meshes/mesh_loading.h"
 #include "scene/volume_part.h"
 

@@ -8,6 +8,7 @@
 
 #include "core/utf8.h"
 #include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_formats.h"
 #include "scene/volumes/volume_name.h"
 
 namespace limn::scene {

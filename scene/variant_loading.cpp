@@ -6,7 +6,7 @@
 #include "core/log.h"
 #include "core/names.h"
 #include "core/utf8.h"
-#include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_formats.h"
 #include "scene/part_units.h"
 #include "scene/slot_folder.h"
 #include "scene/volume_part.h"

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
-#include <new>
+#include <stdexcept>
 
 #include "core/result.h"
-#include "sim/embree.h"
+#include "sim/ray_tracer.h"
 #include "sim/texture.h"
 
 namespace limn::sim {
@@ -16,20 +15,6 @@ namespace {
 // A ray continues behind a cut-out after this share of its distance, but at least after this length (m).
 constexpr float k_behind_cut_out = 1e-6F;
 constexpr double k_surface_gap = 1e-4;  // m; nearer surfaces do not occlude a shadow ray
-
-RTCRay ray_between(const Eigen::Vector3f& from, const Eigen::Vector3f& d, float near, float far) {
-  RTCRay ray{};
-  ray.org_x = from.x();
-  ray.org_y = from.y();
-  ray.org_z = from.z();
-  ray.tnear = near;
-  ray.dir_x = d.x();
-  ray.dir_y = d.y();
-  ray.dir_z = d.z();
-  ray.tfar = far;
-  ray.mask = ~0U;
-  return ray;
-}
 
 struct Placed {
   const scene::Mesh* mesh = nullptr;
@@ -47,38 +32,11 @@ struct Placed {
   }
 };
 
-RTCGeometry geometry_of(RTCDevice device, Placed& placed) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-  const std::size_t vertices = placed.mesh->positions.size();
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, placed.positions.data(),
-                             0, sizeof(Eigen::Vector3f), vertices);
-  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                             placed.mesh->triangles.data(), 0, sizeof(placed.mesh->triangles[0]),
-                             placed.mesh->triangles.size());
-  rtcCommitGeometry(geometry);
-  return geometry;
-}
-
-// Embree keeps its last error until it is asked. Threads that cannot be started for want of memory are an
-// unknown error to it.
-void check_memory(RTCDevice device) {
-  const RTCError problem = rtcGetDeviceError(device);
-  if (problem == RTC_ERROR_OUT_OF_MEMORY || (device == nullptr && problem == RTC_ERROR_UNKNOWN))
-    throw std::bad_alloc();
-  LIMN_CHECK(device != nullptr && problem == RTC_ERROR_NONE);
-}
-
 }  // namespace
 
 struct RayScene::Impl {
-  RTCDevice device = nullptr;
-  RTCScene scene = nullptr;
   std::vector<Placed> placed;
-
-  ~Impl() {
-    if (scene != nullptr) rtcReleaseScene(scene);
-    if (device != nullptr) rtcReleaseDevice(device);
-  }
+  std::unique_ptr<RayTracer> tracer;
 
   const std::array<std::uint32_t, 3>& corners(const Hit& hit) const {
     return placed[static_cast<std::size_t>(hit.object)]
@@ -92,16 +50,13 @@ struct RayScene::Impl {
     return (corner(hit, 1) - p).cross(corner(hit, 2) - p);
   }
 
-  Hit completed(const RTCRayHit& found, const Eigen::Vector3d& p_origin, const Eigen::Vector3d& d) const {
-    Hit hit;
-    if (found.hit.geomID == RTC_INVALID_GEOMETRY_ID) return hit;
-    hit.object = static_cast<int>(found.hit.geomID);
-    hit.triangle = static_cast<int>(found.hit.primID);
-    hit.barycentric = {found.hit.u, found.hit.v};
+  Hit completed(const TracedHit& found, const Eigen::Vector3d& p_origin, const Eigen::Vector3d& d) const {
+    if (found.mesh < 0) return {};
+    Hit hit{.object = found.mesh, .triangle = found.triangle, .barycentric = {found.u, found.v}};
     const Eigen::Vector3d n = scaled_normal(hit);
     const double approach = n.dot(d);
     const double exact = n.dot(corner(hit, 0) - p_origin) / approach;
-    const double traced = static_cast<double>(found.ray.tfar);
+    const double traced = static_cast<double>(found.distance);
     // Triangles seen edge-on have no usable plane; for them the traced distance is the best value.
     hit.distance = std::abs(exact - traced) < 1e-3 ? exact : traced;
     return hit;
@@ -109,32 +64,26 @@ struct RayScene::Impl {
 };
 
 RayScene::RayScene(std::span<const MeshInstance> meshes, bool moves) : impl_(std::make_unique<Impl>()) {
-  impl_->device = rtcNewDevice("threads=2");
-  check_memory(impl_->device);
-  impl_->scene = rtcNewScene(impl_->device);
-  rtcSetSceneFlags(impl_->scene,
-                   moves ? RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_DYNAMIC : RTC_SCENE_FLAG_ROBUST);
+  auto tracer = make_ray_tracer(moves);
+  if (!tracer) throw std::runtime_error(tracer.message());
+  impl_->tracer = std::move(*tracer);
   impl_->placed.resize(meshes.size());
   for (std::size_t i = 0; i < meshes.size(); ++i) {
     Placed& placed = impl_->placed[i];
     placed.mesh = meshes[i].mesh;
     placed.place(meshes[i].world_from_mesh);
-    RTCGeometry geometry = geometry_of(impl_->device, placed);
-    rtcAttachGeometryByID(impl_->scene, geometry, static_cast<unsigned>(i));
-    rtcReleaseGeometry(geometry);
+    impl_->tracer->add_mesh(std::span(placed.positions).first(placed.mesh->positions.size()),
+                            placed.mesh->triangles);
   }
-  rtcCommitScene(impl_->scene);
-  check_memory(impl_->device);
+  impl_->tracer->commit();
 }
 
 void RayScene::move(std::span<const std::size_t> meshes, std::span<const Pose> world_from_mesh) {
   for (std::size_t k = 0; k < meshes.size(); ++k) {
     impl_->placed[meshes[k]].place(world_from_mesh[k]);  // the memory stays where it is
-    const RTCGeometry geometry = rtcGetGeometry(impl_->scene, static_cast<unsigned>(meshes[k]));
-    rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
-    rtcCommitGeometry(geometry);
+    impl_->tracer->update_mesh(meshes[k]);
   }
-  rtcCommitScene(impl_->scene);
+  impl_->tracer->commit();
 }
 
 RayScene::~RayScene() = default;
@@ -143,61 +92,36 @@ RayScene& RayScene::operator=(RayScene&&) noexcept = default;
 
 Hit RayScene::first_hit(const Ray& ray) const {
   constexpr int k_most_cut_out = 64;  // number of cut-out layers that a ray passes
-  float from = 0;
+  float near = 0;
   for (int layer = 0; layer < k_most_cut_out; ++layer) {
-    RTCRayHit query{};
-    query.ray = ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), from,
-                            std::numeric_limits<float>::infinity());
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    embree::intersect(impl_->scene, query);
-    const Hit hit = impl_->completed(query, ray.p_origin, ray.d);
+    const TracedHit traced = impl_->tracer->first_hit(ray.p_origin.cast<float>(), ray.d.cast<float>(), near);
+    const Hit hit = impl_->completed(traced, ray.p_origin, ray.d);
     if (hit.object < 0) return hit;
     const scene::Mesh& mesh = *impl_->placed[static_cast<std::size_t>(hit.object)].mesh;
     if (!is_cut_out(mesh, hit.triangle, uv(hit))) return hit;
-    from = query.ray.tfar + k_behind_cut_out * std::max(1.0F, query.ray.tfar);
+    near = traced.distance + k_behind_cut_out * std::max(1.0F, traced.distance);
   }
   return {};
 }
 
 Hit RayScene::next_surface(const Ray& ray) const {
-  RTCRayHit query{};
-  query.ray =
-      ray_between(ray.p_origin.cast<float>(), ray.d.cast<float>(), 0, std::numeric_limits<float>::infinity());
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  embree::intersect(impl_->scene, query);
-  return impl_->completed(query, ray.p_origin, ray.d);
+  return impl_->completed(impl_->tracer->first_hit(ray.p_origin.cast<float>(), ray.d.cast<float>(), 0),
+                          ray.p_origin, ray.d);
 }
 
 void RayScene::first_hits(const Eigen::Vector3d& p_origin,
                           std::span<const Eigen::Vector3f> d,
                           std::span<Hit> hits) const {
-  const Eigen::Vector3f from = p_origin.cast<float>();
-  std::vector<RTCRayHit> queries(d.size());
-  for (std::size_t i = 0; i < d.size(); ++i) {
-    const bool usable = d[i].allFinite();
-    queries[i].ray = ray_between(from, usable ? d[i] : Eigen::Vector3f::UnitZ(), 0,
-                                 usable ? std::numeric_limits<float>::infinity() : -1.0F);
-    queries[i].hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  }
-  embree::intersect_coherent(impl_->scene, queries);
+  std::vector<TracedHit> traced(d.size());
+  impl_->tracer->first_hits(p_origin.cast<float>(), d, traced);
   for (std::size_t i = 0; i < d.size(); ++i)
-    hits[i] = impl_->completed(queries[i], p_origin, d[i].cast<double>());
+    hits[i] = impl_->completed(traced[i], p_origin, d[i].cast<double>());
 }
 
 void RayScene::reached(const Eigen::Vector3d& p_light,
                        std::span<const Eigen::Vector3f> p,
                        std::span<std::uint8_t> reached) const {
-  const Eigen::Vector3f from = p_light.cast<float>();
-  std::vector<RTCRay> queries(p.size());
-  for (std::size_t i = 0; i < p.size(); ++i) {
-    const Eigen::Vector3f towards = p[i] - from;
-    const float distance = towards.norm();
-    const bool usable = std::isfinite(distance) && distance > 0;
-    queries[i] = ray_between(from, usable ? Eigen::Vector3f(towards / distance) : Eigen::Vector3f::UnitZ(), 0,
-                             usable ? distance - static_cast<float>(k_surface_gap) : -1.0F);
-  }
-  embree::occlude_coherent(impl_->scene, queries);
-  for (std::size_t i = 0; i < p.size(); ++i) reached[i] = queries[i].tfar >= 0 ? 1 : 0;
+  impl_->tracer->reached(p_light.cast<float>(), p, static_cast<float>(k_surface_gap), reached);
 }
 
 bool RayScene::reached(const Eigen::Vector3d& p_light, const Eigen::Vector3d& p) const {

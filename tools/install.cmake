@@ -7,7 +7,12 @@ install(TARGETS limn RUNTIME COMPONENT program)
 if(TARGET limn-cad)
   install(TARGETS limn-cad RUNTIME COMPONENT cad)
 endif()
-install(TARGETS limn_room_dds limn_video limn_volume_readers LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
+# The shared libraries that are loaded when they are needed. Those that liblimn.so needs, too, are installed once more for
+# it, because the program's package and the library's do not need each other.
+set(both limn_loaded_exr limn_loaded_meshes limn_loaded_mrcal limn_loaded_volumes)
+install(TARGETS limn_room_dds limn_loaded_gige limn_loaded_printing limn_loaded_rays limn_loaded_video ${both}
+  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
+install(TARGETS ${both} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/liblimn COMPONENT library)
 install(FILES ${install_files}/limn.desktop DESTINATION ${CMAKE_INSTALL_DATADIR}/applications COMPONENT program)
 install(FILES ${install_files}/io.github.limn.metainfo.xml
   DESTINATION ${CMAKE_INSTALL_DATADIR}/metainfo COMPONENT program)

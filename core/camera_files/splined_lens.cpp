@@ -112,9 +112,10 @@ std::optional<Knots> knots_over(const Reach& reach, int columns) {
       fmt::format("LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx={}_Ny={}_fov_x_deg={}", columns, rows, fov_deg),
       std::vector<double>(static_cast<std::size_t>(columns)),
       std::vector<double>(static_cast<std::size_t>(rows))};
+  const MrcalFunctions& mrcal = *mrcal_functions().value();  // the lens to be fitted has loaded them
   mrcal_lensmodel_t model;
-  if (!mrcal_lensmodel_from_name(&model, knots.model_name.c_str()) ||
-      !mrcal_knots_for_splined_models(knots.x.data(), knots.y.data(), &model))
+  if (!mrcal.lensmodel_from_name(&model, knots.model_name.c_str()) ||
+      !mrcal.knots_for_splined_models(knots.x.data(), knots.y.data(), &model))
     return std::nullopt;
   return knots;
 }

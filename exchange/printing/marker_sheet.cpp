@@ -1,8 +1,5 @@
 #include "exchange/printing/marker_sheet.h"
 
-#include <cairo-pdf.h>
-#include <cairo-svg.h>
-
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -14,57 +11,31 @@
 #include "calib/board/board.h"
 #include "core/file.h"
 #include "core/image_io.h"
+#include "exchange/printing/page_drawing.h"
 #include "tracker/family.h"
 
 namespace limn::exchange {
 namespace {
 
-constexpr double k_points_per_mm = 72 / 25.4;
 constexpr double k_page_width = 210, k_page_height = 297;  // mm, A4
 constexpr double k_edge = 10;                              // mm that printers leave white at the edges
 constexpr double k_foot = 16;                              // mm at the bottom, for the bar
 constexpr double k_label = 6;                              // mm below a marker, for its name
 constexpr double k_bar = 100;                              // mm
 
-struct Sheet {
-  std::string bytes;
-  std::shared_ptr<cairo_surface_t> surface;
-  std::shared_ptr<cairo_t> cairo;
-};
-
-cairo_status_t append(void* bytes, const unsigned char* data, unsigned int length) {
-  static_cast<std::string*>(bytes)->append(reinterpret_cast<const char*>(data), length);
-  return CAIRO_STATUS_SUCCESS;
+Status write_sheet(PageDrawing& sheet, const std::filesystem::path& path) {
+  const auto bytes = sheet.finish();
+  if (!bytes) return error("{}: cannot draw the sheet: {}", path.string(), bytes.message());
+  return write_file(path, *bytes);
 }
 
-// A page in millimetres, origin at the top left.
-std::unique_ptr<Sheet> new_sheet(bool svg, double width_mm, double height_mm) {
-  auto sheet = std::make_unique<Sheet>();
-  const double width = width_mm * k_points_per_mm;
-  const double height = height_mm * k_points_per_mm;
-  cairo_surface_t* surface = svg ? cairo_svg_surface_create_for_stream(append, &sheet->bytes, width, height)
-                                 : cairo_pdf_surface_create_for_stream(append, &sheet->bytes, width, height);
-  sheet->surface.reset(surface, cairo_surface_destroy);
-  sheet->cairo.reset(cairo_create(surface), cairo_destroy);
-  cairo_scale(sheet->cairo.get(), k_points_per_mm, k_points_per_mm);
-  return sheet;
+PageFormat format_of(const std::filesystem::path& path) {
+  return path.extension() == ".svg" ? PageFormat::svg : PageFormat::pdf;
 }
 
-Status write_sheet(Sheet& sheet, const std::filesystem::path& path) {
-  cairo_show_page(sheet.cairo.get());
-  cairo_surface_finish(sheet.surface.get());
-  const cairo_status_t status = cairo_surface_status(sheet.surface.get());
-  if (status != CAIRO_STATUS_SUCCESS)
-    return error("{}: cannot draw the sheet: {}", path.string(), cairo_status_to_string(status));
-  return write_file(path, sheet.bytes);
-}
-
-void set_grey(cairo_t* cairo, double level) { cairo_set_source_rgb(cairo, level, level, level); }
-
-// Draws an image as vectors: all pixels of a grey level are rectangles of one path, so that there are no
-// seams between neighbours.
-void draw_cells(cairo_t* cairo, const cv::Mat& image, double x_mm, double y_mm, double mm_per_pixel) {
-  std::map<std::uint8_t, std::vector<cv::Rect>> levels;
+// Draws an image as vectors: all pixels of a grey level are rectangles of one path.
+void draw_cells(PageDrawing& page, const cv::Mat& image, double x_mm, double y_mm, double mm_per_pixel) {
+  std::map<std::uint8_t, std::vector<cv::Rect2d>> levels;
   for (int y = 0; y < image.rows;) {
     int below = y + 1;
     while (below < image.rows && std::equal(image.ptr(y), image.ptr(y) + image.cols, image.ptr(below)))
@@ -73,44 +44,24 @@ void draw_cells(cairo_t* cairo, const cv::Mat& image, double x_mm, double y_mm, 
       const std::uint8_t level = image.at<std::uint8_t>(y, x);
       int right = x + 1;
       while (right < image.cols && image.at<std::uint8_t>(y, right) == level) ++right;
-      if (level != 255) levels[level].emplace_back(x, y, right - x, below - y);
+      if (level != 255)
+        levels[level].emplace_back(x_mm + x * mm_per_pixel, y_mm + y * mm_per_pixel,
+                                   (right - x) * mm_per_pixel, (below - y) * mm_per_pixel);
       x = right;
     }
     y = below;
   }
-  for (const auto& [level, rectangles] : levels) {
-    for (const cv::Rect& r : rectangles)
-      cairo_rectangle(cairo, x_mm + r.x * mm_per_pixel, y_mm + r.y * mm_per_pixel, r.width * mm_per_pixel,
-                      r.height * mm_per_pixel);
-    set_grey(cairo, level / 255.0);
-    cairo_fill(cairo);
-  }
+  for (const auto& [level, rectangles] : levels) page.fill(rectangles, level / 255.0);
 }
 
-void draw_text(
-    cairo_t* cairo, const std::string& text, double x_mm, double y_mm, double height_mm, double room_mm) {
-  cairo_select_font_face(cairo, "sans-serif", CAIRO_FONT_SLANT_NORMAL, CAIRO_FONT_WEIGHT_NORMAL);
-  cairo_set_font_size(cairo, height_mm);
-  cairo_text_extents_t extents;
-  cairo_text_extents(cairo, text.c_str(), &extents);
-  if (extents.x_advance > room_mm) cairo_set_font_size(cairo, height_mm * room_mm / extents.x_advance);
-  set_grey(cairo, 0);
-  cairo_move_to(cairo, x_mm, y_mm);
-  cairo_show_text(cairo, text.c_str());
-}
-
-void draw_bar(cairo_t* cairo, double x_mm, double y_mm) {
-  set_grey(cairo, 0);
-  cairo_set_line_width(cairo, 0.25);
-  cairo_move_to(cairo, x_mm, y_mm);
-  cairo_line_to(cairo, x_mm + k_bar, y_mm);
+void draw_bar(PageDrawing& page, double x_mm, double y_mm) {
+  std::vector<PageDrawing::Points> lines = {{{x_mm, y_mm}, {x_mm + k_bar, y_mm}}};
   for (int i = 0; i <= 10; ++i) {
-    const double tick = i % 5 == 0 ? 3 : 1.5;
-    cairo_move_to(cairo, x_mm + i * k_bar / 10, y_mm - tick);
-    cairo_line_to(cairo, x_mm + i * k_bar / 10, y_mm);
+    const double tick = i % 5 == 0 ? 3 : 1.5, x = x_mm + i * k_bar / 10;
+    lines.push_back({{x, y_mm - tick}, {x, y_mm}});
   }
-  cairo_stroke(cairo);
-  draw_text(cairo, "100 mm: measure it; print at 100 %, not \"fit to page\"", x_mm, y_mm + 4, 3, 150);
+  page.stroke(lines, 0.25, 0);
+  page.write("100 mm: measure it; print at 100 %, not \"fit to page\"", {x_mm, y_mm + 4}, 3, 150);
 }
 
 struct Grid {
@@ -133,7 +84,7 @@ Result<Grid> grid_for(double size_mm, double square_share) {
 }
 
 // Draws the frame to cut along with its mark at the top left, the marker, and its name.
-void draw_marker_cell(cairo_t* cairo,
+void draw_marker_cell(PageDrawing& page,
                       const cv::Mat& cells,
                       const std::string& label,
                       double x,
@@ -141,19 +92,11 @@ void draw_marker_cell(cairo_t* cairo,
                       double size,
                       double margin) {
   const double side = size + 2 * margin;
-  set_grey(cairo, 0.75);
-  cairo_set_line_width(cairo, 0.1);
-  cairo_rectangle(cairo, x, y, side, side);
-  cairo_stroke(cairo);
+  page.stroke(cv::Rect2d(x, y, side, side), 0.1, 0.75);
   const double mark = std::min(2.0, 0.5 * margin);  // a triangle in the frame's top-left corner
-  set_grey(cairo, 0.35);
-  cairo_move_to(cairo, x, y);
-  cairo_line_to(cairo, x + mark, y);
-  cairo_line_to(cairo, x, y + mark);
-  cairo_close_path(cairo);
-  cairo_fill(cairo);
-  draw_cells(cairo, cells, x + margin, y + margin, size / cells.cols);
-  draw_text(cairo, label, x, y + side + 3.6, 3, side);
+  page.fill({{x, y}, {x + mark, y}, {x, y + mark}}, 0.35);
+  draw_cells(page, cells, x + margin, y + margin, size / cells.cols);
+  page.write(label, {x, y + side + 3.6}, 3, side);
 }
 
 Result<std::vector<std::string>> parse_ids(const std::string& text) {
@@ -218,7 +161,8 @@ Result<double> around_mm(const MarkerSheetOptions& options) {
 }
 
 Result<MarkerSheet> write_marker_sheet(const MarkerSheetOptions& options) {
-  const bool svg = options.out.extension() == ".svg";
+  const PageFormat format = format_of(options.out);
+  const cv::Size2d page_size(k_page_width, k_page_height);
   if (!std::isfinite(options.size_mm) || options.size_mm < 3)
     return usage_error("--size-mm: expected at least 3, found {}.", options.size_mm);
   LIMN_TRY(const std::vector<Drawing> drawings, drawings_of(options));
@@ -229,26 +173,26 @@ Result<MarkerSheet> write_marker_sheet(const MarkerSheetOptions& options) {
   const int per_page = grid.columns * grid.rows;
   const int count = static_cast<int>(drawings.size());
   const int pages = (count + per_page - 1) / per_page;
-  std::unique_ptr<Sheet> sheet = new_sheet(svg, k_page_width, k_page_height);
+  LIMN_TRY(std::unique_ptr<PageDrawing> sheet, make_page_drawing(format, page_size));
   for (int page = 0; page < pages; ++page) {
-    draw_bar(sheet->cairo.get(), k_edge, k_page_height - k_edge - 5);
+    draw_bar(*sheet, k_edge, k_page_height - k_edge - 5);
     for (int i = page * per_page; i < std::min(count, (page + 1) * per_page); ++i) {
       const int place = i - page * per_page;
       const Drawing& drawing = drawings[static_cast<std::size_t>(i)];
-      draw_marker_cell(sheet->cairo.get(), drawing.marker.image, drawing.label,
-                       k_edge + place % grid.columns * grid.pitch_x,
-                       k_edge + place / grid.columns * grid.pitch_y, options.size_mm / square_share,
-                       grid.margin);
+      draw_marker_cell(
+          *sheet, drawing.marker.image, drawing.label, k_edge + place % grid.columns * grid.pitch_x,
+          k_edge + place / grid.columns * grid.pitch_y, options.size_mm / square_share, grid.margin);
     }
     if (page + 1 == pages) break;
-    if (svg) {
+    if (format == PageFormat::svg) {
       LIMN_TRY_STATUS(write_sheet(*sheet, page_path(options.out, page)));
-      sheet = new_sheet(svg, k_page_width, k_page_height);
+      LIMN_TRY(sheet, make_page_drawing(format, page_size));
     } else {
-      cairo_show_page(sheet->cairo.get());
+      sheet->add_page();
     }
   }
-  LIMN_TRY_STATUS(write_sheet(*sheet, svg ? page_path(options.out, pages - 1) : options.out));
+  LIMN_TRY_STATUS(
+      write_sheet(*sheet, format == PageFormat::svg ? page_path(options.out, pages - 1) : options.out));
   return MarkerSheet{count, pages};
 }
 
@@ -263,10 +207,11 @@ Result<std::string> write_board_sheet(const std::string& text, const std::filesy
     const double width = drawing.image.cols * mm_per_pixel;
     const double height = drawing.image.rows * mm_per_pixel;
     const double page_width = std::max(width, k_bar + 2 * k_edge);
-    auto sheet = new_sheet(extension == ".svg", page_width, height + k_foot);
-    draw_cells(sheet->cairo.get(), drawing.image, 0.5 * (page_width - width), 0, mm_per_pixel);
-    draw_bar(sheet->cairo.get(), k_edge, height + 5);
-    draw_text(sheet->cairo.get(), board->text(), k_edge, height + 13, 3, page_width - 2 * k_edge);
+    LIMN_TRY(const std::unique_ptr<PageDrawing> sheet,
+             make_page_drawing(format_of(out), {page_width, height + k_foot}));
+    draw_cells(*sheet, drawing.image, 0.5 * (page_width - width), 0, mm_per_pixel);
+    draw_bar(*sheet, k_edge, height + 5);
+    sheet->write(board->text(), {k_edge, height + 13}, 3, page_width - 2 * k_edge);
     LIMN_TRY_STATUS(write_sheet(*sheet, out));
   }
   return board->text();

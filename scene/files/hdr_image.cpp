@@ -1,33 +1,19 @@
 #include "scene/files/hdr_image.h"
 
-#include <OpenEXR/ImfHeader.h>
-#include <OpenEXR/ImfIO.h>
-#include <OpenEXR/ImfRgbaFile.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstring>
-#include <stdexcept>
 #include <vector>
 
 #include "core/file.h"
+#include "scene/files/exr_image.h"
 
 namespace limn::scene {
 namespace {
 
-constexpr int k_most_width = 16384, k_most_height = 8192;
 constexpr std::string_view k_exr_magic = "\x76\x2f\x31\x01";
-
-Status check_size(const std::string& name, long width, long height) {
-  if (width >= 1 && height >= 1 && width <= k_most_width && height <= k_most_height) return {};
-  return error("{}: expected an image of at most {} x {} pixels, found {} x {}.", name, k_most_width,
-               k_most_height, width, height);
-}
-
-// ---- Radiance
 
 // The file's bytes, one line or one byte at a time.
 class Bytes {
@@ -129,7 +115,7 @@ Result<cv::Mat> decode_radiance(std::string_view all, const std::string& name) {
   const auto size = size_of(resolution);
   if (!size)
     return error("{}: expected \"-Y HEIGHT +X WIDTH\", found \"{}\".", name, resolution.substr(0, 60));
-  LIMN_TRY_STATUS(check_size(name, size->width, size->height));
+  LIMN_TRY_STATUS(check_hdr_size(name, size->width, size->height));
   // A packed row needs at least two bytes for each 127 pixels of a channel, a plain one 4.
   if (bytes.left() < static_cast<std::size_t>(size->height) * 4)
     return error("{}: expected {} rows of pixels, found the end of the file.", name, size->height);
@@ -151,60 +137,6 @@ Result<cv::Mat> decode_radiance(std::string_view all, const std::string& name) {
     }
   }
   return image;
-}
-
-// ---- OpenEXR
-
-class ExrBytes final : public Imf::IStream {
- public:
-  ExrBytes(std::string_view bytes, const std::string& name) : IStream(name.c_str()), bytes_(bytes) {}
-  bool read(char to[], int count) override {
-    if (count < 0 || static_cast<std::size_t>(count) > bytes_.size() - at_)
-      throw std::runtime_error("the file ends too early");
-    std::memcpy(to, bytes_.data() + at_, static_cast<std::size_t>(count));
-    at_ += static_cast<std::size_t>(count);
-    return at_ < bytes_.size();
-  }
-  decltype(std::declval<Imf::IStream&>().tellg()) tellg() override { return at_; }
-  void seekg(decltype(std::declval<Imf::IStream&>().tellg()) at) override {
-    if (at > bytes_.size()) throw std::runtime_error("the file ends too early");
-    at_ = static_cast<std::size_t>(at);
-  }
-
- private:
-  std::string_view bytes_;
-  std::size_t at_ = 0;
-};
-
-Result<cv::Mat> decode_exr(std::string_view bytes, const std::string& name) {
-  try {
-    Imf::Header::setMaxImageSize(k_most_width, k_most_height);  // before it makes tables of rows and tiles
-    Imf::Header::setMaxTileSize(k_most_width, k_most_height);
-    ExrBytes stream(bytes, name);
-    Imf::RgbaInputFile file(stream);
-    if ((file.channels() & (Imf::WRITE_RGB | Imf::WRITE_Y)) == 0)
-      return error(
-          "{}: expected an OpenEXR image with channels R, G and B, found others. Export it as a plain image, "
-          "without layers.",
-          name);
-    const Imath::Box2i window = file.dataWindow();
-    const long width = static_cast<long>(window.max.x) - window.min.x + 1,
-               height = static_cast<long>(window.max.y) - window.min.y + 1;
-    LIMN_TRY_STATUS(check_size(name, width, height));
-    std::vector<Imf::Rgba> pixels(static_cast<std::size_t>(width * height));
-    file.setFrameBuffer(pixels.data() - window.min.x - window.min.y * width, 1,
-                        static_cast<std::size_t>(width));
-    file.readPixels(window.min.y, window.max.y);
-    cv::Mat image(static_cast<int>(height), static_cast<int>(width), CV_32FC3);
-    for (int y = 0; y < image.rows; ++y)
-      for (int x = 0; x < image.cols; ++x) {
-        const Imf::Rgba& pixel = pixels[static_cast<std::size_t>(y * width + x)];
-        image.at<cv::Vec3f>(y, x) = {pixel.b, pixel.g, pixel.r};
-      }
-    return image;
-  } catch (const std::exception& failed) {
-    return error("{}: expected an OpenEXR image, but it cannot be read: {}.", name, failed.what());
-  }
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "scene/meshes/cad_file.h"
 #include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_formats.h"
 #include "scene/meshes/mesh_from_content.h"
 #include "scene/meshes/mesh_loading.h"
 #include "scene/meshes/mesh_trial.h"

@@ -13,6 +13,7 @@
 #include <new>
 
 #include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_formats.h"
 
 namespace limn::scene {
 

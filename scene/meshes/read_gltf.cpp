@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "scene/files/draco_mesh.h"
 #include "scene/files/gltf_file.h"
+#include "scene/meshes/draco_mesh.h"
 #include "scene/meshes/gltf_materials.h"
 #include "scene/meshes/gltf_variants.h"
 #include "scene/meshes/read_materials.h"

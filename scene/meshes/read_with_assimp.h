@@ -10,6 +10,7 @@ namespace limn::scene {
 /// are not swapped; skins stand in the pose of their nodes. Colours of vertices are taken as sRGB. FBX (cm
 /// unless it says otherwise), COLLADA (m) and AMF (mm) state their unit. Morph targets are not applied, with
 /// a warning. It must be used by one thread at a time, because assimp's logger is global.
+/// Error also: the shared library with assimp (scene/meshes/readers/) is not there.
 Result<MeshContent> read_with_assimp(const std::filesystem::path& path);
 
 }  // namespace limn::scene

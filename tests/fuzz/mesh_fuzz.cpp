@@ -9,6 +9,7 @@
 #include "core/log.h"
 #include "exchange/zip.h"
 #include "scene/files/gltf_file.h"
+#include "scene/meshes/mesh_formats.h"
 #include "scene/meshes/mesh_from_content.h"
 #include "tests/fuzz/fuzz_file.h"
 

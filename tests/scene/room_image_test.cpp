@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/file.h"
-#include "exchange/exr.h"
+#include "scene/files/exr_image.h"
 #include "scene/files/hdr_image.h"
 #include "scene/scene.h"
 #include "scene/show_state.h"
@@ -51,7 +51,7 @@ TEST(HdrImage, RadianceRowsArePackedOrNot) {
 TEST(HdrImage, OpenExrIsRead) {
   cv::Mat light(4, 8, CV_32FC3, cv::Scalar(2, 0.5, 0.25));  // red, green, blue
   light.at<cv::Vec3f>(3, 7) = {1e30F, 0, 1000};
-  const auto image = decode_hdr_image(exchange::exr_bytes(light, ""), "room.exr");
+  const auto image = decode_hdr_image(encode_exr(light, "").value(), "room.exr");
   ASSERT_TRUE(image) << image.message();
   ASSERT_EQ(image->size(), light.size());
   EXPECT_EQ(image->at<cv::Vec3f>(2, 3), cv::Vec3f(0.25F, 0.5F, 2));
@@ -73,8 +73,8 @@ TEST(HdrImage, WhatIsDamagedIsNamed) {
   expect(message(k_head + "EXPOSURE=0\n\n-Y 1 +X 1\n1234"), "EXPOSURE");
   expect(message(k_head + "\n-Y 1 +X 8\n" + bytes({2, 2, 0, 8, 128 + 9, 1}) + "12345678"), "a damaged row");
   cv::Mat none(2, 4, CV_32FC3, cv::Scalar::all(std::numeric_limits<float>::quiet_NaN()));
-  expect(message(exchange::exr_bytes(none, "")), "expected numbers");
-  const std::string radiance = two_rows(), exr = exchange::exr_bytes(cv::Mat::ones(4, 8, CV_32FC3), "");
+  expect(message(encode_exr(none, "").value()), "expected numbers");
+  const std::string radiance = two_rows(), exr = encode_exr(cv::Mat::ones(4, 8, CV_32FC3), "").value();
   for (const std::string& whole : {radiance, exr})
     for (std::size_t size = 0; size < whole.size(); ++size)
       EXPECT_NE(message(whole.substr(0, size)), "(no error)") << size << " of " << whole.size();
@@ -84,8 +84,8 @@ Result<Scene> loaded(const json& light) {
   const auto folder = test::test_folder();
   cv::Mat room(2, 4, CV_32FC3, cv::Scalar::all(0));
   room.at<cv::Vec3f>(1, 2) = {3, 2, 1};  // below the horizon, a little right of the middle
-  EXPECT_TRUE(write_file(folder / "room.exr", exchange::exr_bytes(room, "")));
-  EXPECT_TRUE(write_file(folder / "square.exr", exchange::exr_bytes(room.colRange(0, 2), "")));
+  EXPECT_TRUE(write_file(folder / "room.exr", encode_exr(room, "").value()));
+  EXPECT_TRUE(write_file(folder / "square.exr", encode_exr(room.colRange(0, 2), "").value()));
   const json scene = {{"schema", "limn.scene/1"}, {"slots", json::array()}, {"light", light}};
   EXPECT_TRUE(write_file(folder / "scene.json", scene.dump()));
   return load_scene(folder);

@@ -17,7 +17,7 @@
 #include "core/rig.h"
 #include "core/stopwatch.h"
 #include "scene/marker_file.h"
-#include "scene/meshes/mesh_content.h"
+#include "scene/meshes/mesh_formats.h"
 #include "scene/meshes/scan_preview.h"
 #include "scene/scene.h"
 #include "tracker/body_pose.h"

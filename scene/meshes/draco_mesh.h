@@ -19,7 +19,8 @@ struct DracoMesh {
 };
 
 /// Decodes a mesh (KHR_draco_mesh_compression). `ids` are Draco's numbers of the attributes, by their names
-/// in glTF. Error: damaged data, a missing attribute.
+/// in glTF. Error: damaged data, a missing attribute,
+/// no library with Draco.
 Result<DracoMesh> decode_draco(std::string_view bytes, const std::map<std::string, std::size_t>& ids);
 
 }  // namespace limn::scene

@@ -1,16 +1,17 @@
-#include "scene/files/draco_mesh.h"
-
 #include <draco/compression/decode.h>
 
-namespace limn::scene {
+#include "scene/meshes/draco_mesh.h"
 
-Result<DracoMesh> decode_draco(std::string_view bytes, const std::map<std::string, std::size_t>& ids) {
+namespace limn::scene {
+namespace {
+
+Result<DracoMesh> decoded(std::string_view bytes, const std::map<std::string, std::size_t>& ids) {
   draco::DecoderBuffer buffer;
   buffer.Init(bytes.data(), bytes.size());
   draco::Decoder decoder;
-  auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-  if (!decoded.ok()) return error("Draco: {}", decoded.status().error_msg());
-  const draco::Mesh& mesh = *decoded.value();
+  auto read = decoder.DecodeMeshFromBuffer(&buffer);
+  if (!read.ok()) return error("Draco: {}", read.status().error_msg());
+  const draco::Mesh& mesh = *read.value();
   DracoMesh out;
   for (const auto& [name, id] : ids) {
     const draco::PointAttribute* attribute = mesh.GetAttributeByUniqueId(static_cast<std::uint32_t>(id));
@@ -29,4 +30,12 @@ Result<DracoMesh> decode_draco(std::string_view bytes, const std::map<std::strin
   return out;
 }
 
+}  // namespace
 }  // namespace limn::scene
+
+extern "C" __attribute__((visibility("default"))) void limn_decode_draco(
+    std::string_view bytes,
+    const std::map<std::string, std::size_t>& ids,
+    limn::Result<limn::scene::DracoMesh>* mesh) {
+  *mesh = limn::scene::decoded(bytes, ids);
+}
