@@ -5,12 +5,15 @@
 #include <opencv2/imgproc.hpp>
 
 #include "projector/bindings.h"
+#include "projector/changed_lines.h"
 #include "projector/renderer.h"
 
 namespace limn::projector {
 namespace {
 
 constexpr int k_response_columns = 1025;
+// Around a changed rectangle light is drawn, too, because edges are found by the neighbours of a pixel.
+constexpr int k_beside_px = 2;
 // Anti-aliasing of the edges of light: for still images, for moving images, and for even black, whose steps
 // are very small.
 constexpr Smoothing k_light_edges, k_quick_edges{.samples = 4},
@@ -20,6 +23,18 @@ const ProjectorResponse* find_response(const Rig& rig, const std::string& projec
   const auto found = std::find_if(rig.responses.begin(), rig.responses.end(),
                                   [&](const ProjectorResponse& r) { return r.projector == projector; });
   return found == rig.responses.end() ? nullptr : &*found;
+}
+
+cv::Rect grown(const cv::Rect& rect, int px) {
+  return {rect.x - px, rect.y - px, rect.width + 2 * px, rect.height + 2 * px};
+}
+
+// Limits the places to a rectangle.
+void keep_inside(const cv::Rect& rect, PlacesByMode* places) {
+  for (std::vector<cv::Rect>* each : {&places->view, &places->surface, &places->both}) {
+    for (cv::Rect& place : *each) place &= rect;
+    std::erase_if(*each, [](const cv::Rect& place) { return place.empty(); });
+  }
 }
 
 }  // namespace
@@ -116,19 +131,38 @@ void ProjectorView::find_places(std::size_t index, const Imager& viewer) {
   light_places_.divide(view_places_, surface_places_);
 }
 
+// The rectangle in which the projector's image differs from the last one: that of changed lines if nothing
+// else has changed, else the whole image.
+cv::Rect ProjectorView::changed_rect(std::size_t index,
+                                     const scene::PosedScene& posed,
+                                     const Imager& viewer) const {
+  const CachedImage& cached = cached_images_[index];
+  const Imager& imager = shared_.rig.projectors[index];
+  const cv::Rect whole(0, 0, imager.width, imager.height);
+  if (!cached.is_current || cached.is_quick != is_quick() || !cached.is_painted ||
+      !shared_.scene.is_painted() || !posed.world_from_prototype ||
+      !is_same(cached.imager_from_world, viewer.imager_from_world))
+    return whole;
+  const auto boxes = changed_lines(cached.posed, posed);
+  return boxes ? rect_around(*boxes, *posed.world_from_prototype, imager).value_or(whole) : whole;
+}
+
 GLuint ProjectorView::draw(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) {
   LIMN_CHECK(index < cached_images_.size());
   CachedImage& cached = cached_images_[index];
   if (cached.is_valid_for(posed, viewer) && cached.is_quick == is_quick()) return *cached.display.texture;
-  cached.is_quick = is_quick();
 
+  const Imager& imager = shared_.rig.projectors[index];
   SceneCache& scene = shared_.scene;
   scene.prepare(posed, SceneCache::FromProjectors::all);
   scene.draw_from_viewer(viewer);
   shared_.balance.find_level(shared_.rig, posed);
   find_places(index, viewer);
+  const cv::Rect changed = changed_rect(index, posed, viewer), whole(0, 0, imager.width, imager.height);
+  cached.is_quick = is_quick();
+  cached.is_painted = scene.is_painted();
+  if (changed != whole) keep_inside(grown(changed, k_beside_px), &light_places_);
 
-  const Imager& imager = shared_.rig.projectors[index];
   if (!cached.display.texture) {
     cached.display = Canvas(imager.width, imager.height, GL_RGBA8);
     cached.hit_cache = HitCache(imager.width, imager.height);
@@ -140,7 +174,7 @@ GLuint ProjectorView::draw(std::size_t index, const scene::PosedScene& posed, co
                                   .with(Resource::hit_cache, cached.hit_cache)
                                   .with(Resource::light_balance, shared_.balance);
   draw_light(index, light, resources);
-  draw_display(index, light, resources);
+  draw_display(index, changed, light, resources);
   cached.mark_valid_for(posed, viewer);
   return *cached.display.texture;
 }
@@ -155,7 +189,10 @@ void ProjectorView::draw_light(std::size_t index, const Canvas& light, const Res
 }
 
 // Converts the light to display values.
-void ProjectorView::draw_display(std::size_t index, const Canvas& light, const Resources& resources) {
+void ProjectorView::draw_display(std::size_t index,
+                                 const cv::Rect& changed,
+                                 const Canvas& light,
+                                 const Resources& resources) {
   const PassTimes::Scope scope(&shared_.times, "response");
   const LightOptions& options = shared_.balance.options();
   const GlName& display = cached_images_[index].display.texture;
@@ -163,7 +200,10 @@ void ProjectorView::draw_display(std::size_t index, const Canvas& light, const R
   const ImageAt drawn(k_target_image, display, GL_RGBA8);
   response_pass_.program().set("u_is_balanced",
                                options.compensation != Compensation::none || options.even_black);
-  glClearTexImage(*display, 0, GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+  response_pass_.program().set("u_first", changed.x, changed.y);
+  response_pass_.program().set("u_end", changed.br().x, changed.br().y);
+  glClearTexSubImage(*display, 0, changed.x, changed.y, 0, changed.width, changed.height, 1, GL_RGBA,
+                     GL_UNSIGNED_BYTE, nullptr);
   light_passes().run_over_drawn_pixels(response_pass_, resources.with(Resource::light, linear)
                                                            .with(Resource::response, response)
                                                            .with(Resource::target, drawn));

@@ -67,6 +67,7 @@ class ProjectorView {
     cv::Mat image, clipped;  // read back from the GPU on demand
     bool is_current = false;
     bool is_quick = false;
+    bool is_painted = false;  // SceneCache::is_painted()
 
     bool is_valid_for(const scene::PosedScene& posed_now, const Imager& viewer) const;
     void mark_valid_for(const scene::PosedScene& posed_now, const Imager& viewer);
@@ -79,8 +80,12 @@ class ProjectorView {
   Status link_light(bool by_measurement, bool is_painted);
   LightPasses& light_passes();
   void find_places(std::size_t index, const Imager& viewer);
+  cv::Rect changed_rect(std::size_t index, const scene::PosedScene& posed, const Imager& viewer) const;
   void draw_light(std::size_t index, const Canvas& light, const Resources& resources);
-  void draw_display(std::size_t index, const Canvas& light, const Resources& resources);
+  void draw_display(std::size_t index,
+                    const cv::Rect& changed,
+                    const Canvas& light,
+                    const Resources& resources);
 
   Shared shared_;
   // By compensation (1: by measurement), and by the prototype's paint (1: it has a finish or lines); linked

@@ -34,6 +34,7 @@ SceneCache::SceneCache(const scene::Scene& scene,
 void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) {
   if (!prepared_ || !is_same(*prepared_, posed)) {
     const bool stays = prepared_ && is_same_prototype(*prepared_, posed);
+    const bool are_ids_same = prepared_ && is_same_without_lines(*prepared_, posed);
     scene_.place_lines(posed);
     scene_.placed(posed, &runs_);
     scene_from_world_ = GpuScene::scene_from_world(posed);
@@ -41,8 +42,8 @@ void SceneCache::prepare(const scene::PosedScene& posed, FromProjectors needed) 
     if (!stays) ++prototype_moves_;
     is_prototype_drawn_ &= stays;
     are_soft_edges_drawn_ &= stays;
-    are_surface_parts_drawn_ = false;
-    viewpoint_kind_ = ViewpointKind::none;
+    are_surface_parts_drawn_ &= are_ids_same;
+    if (!are_ids_same) viewpoint_kind_ = ViewpointKind::none;
     prepared_ = posed;
   }
   scene_.cut_prototype(false);

@@ -18,6 +18,7 @@ namespace limn::projector {
 using limn::is_same;
 using scene::is_same;
 using scene::is_same_prototype;
+using scene::is_same_without_lines;
 bool is_same(const PlacedRun& a, const PlacedRun& b);
 /// Whether both have the same size and lens; their poses may differ.
 bool is_same_lens(const Imager& a, const Imager& b);

@@ -38,7 +38,7 @@ Cell cell_of(const Eigen::Vector3d& p) { return (p / k_cell).array().floor().mat
 // Calls `use` for the bucket of each cell that a segment's light can reach.
 template <class Use>
 void for_buckets(const Segment& segment, std::uint32_t buckets, const Use& use) {
-  const double reach = std::max(segment.style.width_m, k_most_blur) / 2 + k_most_blur / 2;
+  const double reach = light_reach(segment.style);
   const Cell low = cell_of((segment.a.cwiseMin(segment.b).array() - reach).matrix()),
              high = cell_of((segment.a.cwiseMax(segment.b).array() + reach).matrix());
   for (int x = low.x(); x <= high.x(); ++x)
@@ -98,6 +98,10 @@ std::size_t most_texels() {
 }
 
 }  // namespace
+
+double light_reach(const scene::LineStyle& style) {
+  return std::max(style.width_m, k_most_blur) / 2 + k_most_blur / 2;
+}
 
 struct SurfaceLines::Staging {
   std::vector<Eigen::Vector4f> repeated;

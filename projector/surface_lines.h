@@ -11,6 +11,9 @@
 
 namespace limn::projector {
 
+/// How far from its middle (m) a line gives light at most, when a pixel shows a wide patch.
+double light_reach(const scene::LineStyle& style);
+
 /// The lines of light on the GPU, in the layout that shaders/surface_lines.glsl reads: repeated lines as
 /// formulas, curves as segments in the cells of a hash grid, so that a pixel looks at few of them.
 class SurfaceLines {

@@ -148,8 +148,12 @@ bool is_same_prototype(const PosedScene& a, const PosedScene& b) {
 }
 
 bool is_same(const PosedScene& a, const PosedScene& b) {
+  return a.lines == b.lines && a.drawn == b.drawn && is_same_without_lines(a, b);
+}
+
+bool is_same_without_lines(const PosedScene& a, const PosedScene& b) {
   return is_same_prototype(a, b) && a.light == b.light && a.finish == b.finish && a.cut == b.cut &&
-         a.lines == b.lines && a.drawn == b.drawn && a.deviation == b.deviation &&
+         a.deviation == b.deviation &&
          std::equal(a.parts.begin(), a.parts.end(), b.parts.begin(), b.parts.end(),
                     [](const PosedPart& p, const PosedPart& q) {
                       return p.slot == q.slot && p.variant == q.variant && p.material == q.material &&

@@ -62,6 +62,8 @@ std::vector<Track> tracks_of(const Scene& scene, const PosedScene& posed);
 /// Whether both look the same: the same poses, variants, materials, finish, lines, light, cut and deviation,
 /// to the last bit.
 bool is_same(const PosedScene& a, const PosedScene& b);
+/// Whether both look the same but for their lines (`lines` and `drawn`).
+bool is_same_without_lines(const PosedScene& a, const PosedScene& b);
 /// Whether the prototype is at the same pose in both.
 bool is_same_prototype(const PosedScene& a, const PosedScene& b);
 

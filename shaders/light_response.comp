@@ -10,6 +10,7 @@ layout(binding = k_light_unit) uniform sampler2D s_light;  // linear light, a: c
 // Display value as a function of the square root of light, evenly spaced from 0 to 1.
 layout(binding = k_response_unit) uniform sampler2D s_response;
 uniform int u_projector;
+uniform ivec2 u_first, u_end;  // the rectangle that is written
 uniform bool u_is_balanced;    // light is relative to the black level, and is dithered against banding
 
 // Ordered dithering with the 4 x 4 matrix (Bayer 1973), values 0 to 1. In the dark, levels differ by up to 15
@@ -32,6 +33,7 @@ vec3 display_value(vec3 light) {
 void main() {
   if (!has_work()) return;
   ivec2 at = work_pixel();
+  if (any(lessThan(at, u_first)) || any(greaterThanEqual(at, u_end))) return;
   vec4 light = texelFetch(s_light, at, 0);
   // 1: the wanted light is brighter than possible, 0.5: darker than possible.
   const float k_tolerance = 0.004;

@@ -5,6 +5,7 @@
 #include <memory>
 #include <opencv2/imgproc.hpp>
 
+#include "projector/changed_lines.h"
 #include "scene/lines/drape.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
@@ -160,6 +161,77 @@ TEST_F(LinesTest, ComeAndGo) {
     dark_sides += cv::countNonZero(light().reshape(1)) == 0;
   }
   EXPECT_EQ(dark_sides, 1);
+}
+
+// A drawn line along the panel, from one end to the other of its course.
+scene::DrawnLine drawn_line(const std::string& name, double from, double to, double y, double wave = 0.02) {
+  scene::DrawnLine line{name, {}, {}};
+  line.style.colour = {0.2, 1, 0.4};
+  line.style.width_m = 4e-3;
+  for (double x = from; x <= to; x += 0.004)
+    line.curve.points.push_back({{x, y + wave * std::sin(20 * x), bow_at(x)}, Vector3d::Zero()});
+  return line;
+}
+
+// Only where a drawn line changes, the image is drawn again. It is then the same as one that is drawn whole.
+TEST_F(LinesTest, ChangesOfDrawnLinesGiveTheSameImageAsAWholeOne) {
+  JudgedRoom room = room_of({repeated("stripes", scene::RepeatedLines::Form::stripes, 0.06, 0.014)});
+  Renderer drawing = renderer(room.scene, room.rig), whole = renderer(room.scene, room.rig);
+  const auto expect_same = [&](const char* what) {
+    SCOPED_TRACE(what);
+    whole.set_quick_motion(true);  // another smoothing, so that the next image is drawn whole
+    whole.projector_image(0, room.posed, room.viewer);
+    whole.set_quick_motion(false);
+    const cv::Mat expected = whole.projector_image(0, room.posed, room.viewer);
+    EXPECT_EQ(cv::norm(drawing.projector_image(0, room.posed, room.viewer), expected, cv::NORM_INF), 0);
+    EXPECT_EQ(cv::norm(drawing.clipped(0), whole.clipped(0), cv::NORM_INF), 0);
+  };
+  for (const char* finish : {"", "dark"}) {
+    room.posed.finish = finish;
+    room.posed.drawn = {drawn_line("a", -0.2, -0.1, 0.05)};
+    expect_same("the first line");
+    for (const double to : {-0.08, 0.0, 0.05, 0.15}) {
+      room.posed.drawn[0] = drawn_line("a", -0.2, to, 0.05);
+      expect_same("a line grows");
+    }
+    for (const double y : {-0.05, -0.1}) {
+      room.posed.drawn.push_back(drawn_line("b", -0.1, 0.1, y));  // two curves of one name, as outlines have
+      expect_same("a curve comes");
+    }
+    room.posed.drawn[1].curve.points[20].p.y() += 0.01;
+    expect_same("a point moves");
+    room.posed.drawn[0].style.colour = {1, 0, 0};
+    expect_same("another colour");
+    room.posed.drawn[2].curve.is_closed = true;
+    expect_same("a closed curve");
+    room.posed.drawn[0] = drawn_line("a", -0.2, 0.15, 0.05, 0.03);
+    expect_same("another course");
+    room.posed.drawn.pop_back();
+    expect_same("a curve goes");
+    room.posed.drawn[1] = drawn_line("b", 3, 3.2, 0.05);
+    expect_same("a line beside the image");
+    room.posed.drawn.clear();
+    expect_same("all lines go");
+  }
+}
+
+TEST_F(LinesTest, AGrowingLineChangesASmallPartOfTheImage) {
+  JudgedRoom room = room_of({});
+  const Imager& projector = room.rig.projectors[0];
+  scene::PosedScene before = room.posed, now = room.posed;
+  before.drawn = {drawn_line("a", -0.2, 0, 0.05)};
+  now.drawn = {drawn_line("a", -0.2, 0.02, 0.05)};
+  const auto boxes = changed_lines(before, now);
+  ASSERT_TRUE(boxes);
+  const auto rect = rect_around(*boxes, *room.posed.world_from_prototype, projector);
+  ASSERT_TRUE(rect);
+  EXPECT_GT(rect->area(), 0);
+  EXPECT_LT(rect->area(), projector.width * projector.height / 100);
+  now.drawn = before.drawn;
+  EXPECT_EQ(rect_around(changed_lines(before, now).value(), *room.posed.world_from_prototype, projector),
+            cv::Rect());
+  now.finish = "dark";
+  EXPECT_FALSE(changed_lines(before, now)) << "not only lines";
 }
 
 struct Seen {
