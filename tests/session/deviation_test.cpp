@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <functional>
@@ -58,6 +59,7 @@ struct Played {
   std::optional<device::GlContext> context;
   std::optional<SessionOutput> output;
   std::optional<Session> session;
+  std::atomic<bool> is_ended = false;  // when set, the session ends
 };
 
 using Turn = std::function<void(const Session&, sim::VirtualRig*)>;
@@ -78,13 +80,14 @@ class Meanwhile final : public SessionClient {
 
 using Edits = std::vector<std::pair<double, std::string>>;  // seconds, value of `deviation`
 
-// `meanwhile` is called in each turn of the loop.
+// `meanwhile` is called in each turn of the loop. `real_time`: as of play_virtually().
 void play(sim::World world,
           const Edits& edits,
           double end_s,
           Played* played,
           const Turn& meanwhile = {},
-          const std::vector<Script::Move>& moves = {}) {
+          const std::vector<Script::Move>& moves = {},
+          const RealTime* real_time = nullptr) {
   played->folder = test::test_folder();
   played->world = world;
   SessionSetup setup;
@@ -108,7 +111,7 @@ void play(sim::World world,
   ASSERT_TRUE(perception && session);
   played->session.emplace(std::move(*session));
   Meanwhile client(meanwhile, &rig);
-  const Status done = play_virtually(end_s, nullptr, false, &rig, &*room,
+  const Status done = play_virtually(end_s, real_time, played->is_ended, &rig, &*room,
                                      {*perception, *played->session, *played->output, {&client}});
   ASSERT_TRUE(done) << done.message();
 }
@@ -417,6 +420,28 @@ TEST(LiveDeviations, RefuseAPrototypeThatWasMovedDuringTheScan) {
   EXPECT_FALSE(played.session->show_state().deviation.is_shown);
   test::expect_contains(notes_of(played), "stand still while it was scanned, found it moved by 6.");
   EXPECT_FALSE(is_image_folder_there(played));
+}
+
+// A person sees how the session goes on, and moves the prototype after the scan, before the result is there.
+TEST(LiveDeviations, GoOnInRealTimeWhileTheResultIsComputed) {
+  sim::World world = door_world(0.5);
+  const Pose before = world.world_from_prototype;
+  const RealTime real_time{.whole = world.rig, .frame_period_s = k_frame_s, .efforts = {Effort{}}};
+  Played played;
+  std::set<Stamp> computing;  // the rig's clock, in turns of the loop in which the result is computed
+  bool is_moved = false;
+  const Turn turn = [&](const Session& session, sim::VirtualRig* rig) {
+    if (session.deviation().progress == "computing") computing.insert(rig->now());
+    if (!is_moved && !computing.empty() && seconds_between(*computing.begin(), rig->now()) > 1) {
+      is_moved = true;
+      rig->move("prototype", Pose(Eigen::Quaterniond::Identity(), {0.006, 0, 0}) * before);
+    }
+    if (session.deviation().result) played.is_ended = true;
+  };
+  play(std::move(world), {{0.5, ""}}, 300, &played, turn, {}, &real_time);
+  EXPECT_TRUE(is_moved) << "the result came within a second: a larger world is needed";
+  EXPECT_GT(computing.size(), 3U);
+  EXPECT_TRUE(played.session->deviation().result) << notes_of(played);
 }
 
 // It stands again where it stood, so that its pose says nothing.
