@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "device/gl_context.h"
+#include "scene/lines/line_file.h"
 #include "session/perception.h"
 #include "session/session.h"
 #include "sim/virtual_rig.h"
@@ -254,6 +255,22 @@ TEST_F(AServedStroke, IsLitWhereItWasDrawnAndSoon) {
       worst_mm, measured, share(begun_ms, 95), share(begun_ms, 50), share(took_ms, 95), share(took_ms, 50));
   EXPECT_GT(measured, 25);
   EXPECT_LT(worst_mm, 0.5);
+
+  // The page's links to the line's files.
+  compose();  // the server gets the state before a frame is drawn
+  const std::string token = token_of(Role::look);
+  for (const char* name : {"lines.csv", "lines.dxf", "lines.step"}) {
+    SCOPED_TRACE(name);
+    const auto answer = client()->get(std::string("/api/") + name, token);
+    ASSERT_EQ(answer.status, 200) << answer.body;
+    ASSERT_TRUE(write_file(folder_ / name, answer.body));
+    const auto curves = scene::read_line_file(folder_ / name);
+    ASSERT_TRUE(curves) << curves.message();
+    ASSERT_EQ(curves->size(), 1U);
+    EXPECT_EQ(curves->front().name, "arch");
+    ASSERT_GT(curves->front().points.size(), 20U);
+    for (const Vector3d& p : curves->front().points) EXPECT_LT(distance(drawn, p), 0.5e-3);
+  }
 }
 
 }  // namespace
