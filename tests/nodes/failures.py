@@ -111,7 +111,7 @@ def the_host_is_killed(machines):
     time.sleep(0.5)
     restarted_ns = time.monotonic_ns()
     machines.start_host(0, "host-2")
-    wait_for(20, lambda: all(rows_in(path) > before[path] for path in paths), "the nodes show the new host's images")
+    wait_for(60, lambda: all(rows_in(path) > before[path] for path in paths), "the nodes show the new host's images")
     time.sleep(1)
     machines.end()
     back_s = max(first_shown_s(path, restarted_ns) for path in paths)
