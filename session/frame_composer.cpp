@@ -26,15 +26,15 @@ Eigen::AlignedBox3d box_of(const scene::Scene& scene) {
   return box;
 }
 
-// Whether the parts of both give the same light.
-bool has_same_light(const FrameDescription& a, const FrameDescription& b) {
+// Whether both give the same light but for lines.
+bool has_no_motion(const FrameDescription& a, const FrameDescription& b) {
   const auto is_steady = [](const FrameDescription& frame) {
     return frame.fading.empty() && frame.gone.empty();
   };
   const auto is_same_map = [](const cv::Mat& map, const cv::Mat& other) {
     return map.size() == other.size() && (map.empty() || cv::norm(map, other, cv::NORM_INF) == 0);
   };
-  return is_steady(a) && is_steady(b) && scene::is_same(a.posed, b.posed) &&
+  return is_steady(a) && is_steady(b) && is_same_without_lines(a.posed, b.posed) &&
          is_same(a.viewer.imager_from_world, b.viewer.imager_from_world) &&
          std::ranges::equal(a.arriving, b.arriving, is_same_map);
 }
@@ -138,7 +138,7 @@ const FrameDescription& FrameComposer::describe(const FrameInput& input) {
   for (const LooseMarker& loose : input.percepts.loose) frame_.loose.push_back(loose.marker);
   frame_.on_surface = surface_overlays(show_state);
   if (!frame_.is_black) frame_.signs = marker_overlays(input);
-  frame_.is_moving = !has_same_light(before, frame_);
+  frame_.is_moving = !has_no_motion(before, frame_);
   return frame_;
 }
 

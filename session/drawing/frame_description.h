@@ -44,8 +44,8 @@ struct FrameDescription {
   /// What PosedScene::deviation names; null: nothing.
   std::shared_ptr<const scene::DeviationLayer> deviation = {};
   bool is_black = false;  ///< no light at all
-  /// Whether the images differ from those before; they are then drawn with fewer samples
-  /// (Renderer::set_quick_motion).
+  /// Whether the images differ from those before in more than lines; they are then drawn with fewer samples
+  /// (Renderer::set_quick_motion). Changed lines are drawn soon without that.
   bool is_moving = false;
   /// The share of each projector's light that arrives (Renderer::set_occlusion), CV_8UC1, in the rig's order;
   /// empty ones, or no entries: all of it.
