@@ -1,14 +1,23 @@
 #pragma once
 
-// OpenCV's marker dictionaries and its detector, versions 4.6 to 4.10. All files of Limn use them through
-// this header, so that what differs between versions stands here: since 4.7 dictionaries are values, the
-// detector is a class, and functions have other names.
-
-#include <opencv2/aruco/charuco.hpp>
-#include <opencv2/core/version.hpp>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
 #include <vector>
 
+#include "core/result.h"
+
+// OpenCV's marker dictionaries and its detector. They are in a shared library of their own
+// (core/opencv_markers/), because OpenCV's module for them, which needs its neural networks and protobuf,
+// would lengthen every start of the program.
+
 namespace limn {
+
+/// A dictionary: square markers of cells x cells cells inside a dark border.
+struct OpencvDictionary {
+  int number = 0;                    ///< OpenCV's, cv::aruco::DICT_…
+  int cells = 0;                     ///< along a side, without the border
+  std::vector<std::uint64_t> codes;  ///< by the id: cells row by row, the first is the highest bit; 1: light
+};
 
 /// The markers that OpenCV's detector found, in pixels. The corners run clockwise from the marker's top left.
 struct OpencvMarkers {
@@ -16,70 +25,16 @@ struct OpencvMarkers {
   std::vector<int> ids;
 };
 
-#if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
+/// The dictionary with OpenCV's number (PredefinedFamily::opencv_dictionary). Loads the shared library at the
+/// first call. Error: it is not there, or a library that it needs is not installed.
+Result<OpencvDictionary> opencv_dictionary(int number);
 
-/// The dictionary with OpenCV's number (PredefinedFamily::opencv_dictionary). Copies share their memory.
-inline cv::aruco::Dictionary opencv_dictionary(int number) {
-  return cv::aruco::getPredefinedDictionary(number);
-}
+/// A marker's image with a border of one cell, 8-bit grey, square. The side is a multiple of its cells.
+cv::Mat opencv_marker_image(const OpencvDictionary& dictionary, int id, int side_px);
 
-/// A marker's image with a border of one cell.
-inline cv::Mat opencv_marker_image(const cv::aruco::Dictionary& dictionary, int id, int side_px) {
-  cv::Mat image;
-  dictionary.generateImageMarker(id, side_px, image);
-  return image;
-}
-
-inline OpencvMarkers find_opencv_markers(const cv::Mat& grey,
-                                         const cv::aruco::Dictionary& dictionary,
-                                         const cv::aruco::DetectorParameters& parameters = {}) {
-  OpencvMarkers found;
-  cv::aruco::ArucoDetector(dictionary, parameters).detectMarkers(grey, found.corners, found.ids);
-  return found;
-}
-
-/// A ChArUco board with its markers where OpenCV 4.6 has them.
-inline cv::Ptr<cv::aruco::CharucoBoard> opencv_charuco_board(cv::Size squares,
-                                                             float square_m,
-                                                             float marker_m,
-                                                             const cv::aruco::Dictionary& dictionary) {
-  const auto board = cv::makePtr<cv::aruco::CharucoBoard>(squares, square_m, marker_m, dictionary);
-  board->setLegacyPattern(true);
-  return board;
-}
-
-#else
-
-/// The dictionary with OpenCV's number (PredefinedFamily::opencv_dictionary). Copies share their memory.
-inline cv::aruco::Dictionary opencv_dictionary(int number) {
-  return *cv::aruco::getPredefinedDictionary(number);
-}
-
-/// A marker's image with a border of one cell.
-inline cv::Mat opencv_marker_image(const cv::aruco::Dictionary& dictionary, int id, int side_px) {
-  cv::Mat image;
-  dictionary.drawMarker(id, side_px, image);
-  return image;
-}
-
-inline OpencvMarkers find_opencv_markers(const cv::Mat& grey,
-                                         const cv::aruco::Dictionary& dictionary,
-                                         const cv::aruco::DetectorParameters& parameters = {}) {
-  OpencvMarkers found;
-  cv::aruco::detectMarkers(grey, cv::makePtr<cv::aruco::Dictionary>(dictionary), found.corners, found.ids,
-                           cv::makePtr<cv::aruco::DetectorParameters>(parameters));
-  return found;
-}
-
-/// A ChArUco board with its markers where OpenCV 4.6 has them.
-inline cv::Ptr<cv::aruco::CharucoBoard> opencv_charuco_board(cv::Size squares,
-                                                             float square_m,
-                                                             float marker_m,
-                                                             const cv::aruco::Dictionary& dictionary) {
-  return cv::aruco::CharucoBoard::create(squares.width, squares.height, square_m, marker_m,
-                                         cv::makePtr<cv::aruco::Dictionary>(dictionary));
-}
-
-#endif
+/// Finds a dictionary's markers, whose dark border is `border_cells` wide.
+OpencvMarkers find_opencv_markers(const cv::Mat& grey,
+                                  const OpencvDictionary& dictionary,
+                                  int border_cells = 1);
 
 }  // namespace limn

@@ -9,7 +9,7 @@ if(TARGET limn-cad)
 endif()
 # The shared libraries that are loaded when they are needed. Those that liblimn.so needs, too, are installed once more for
 # it, because the program's package and the library's do not need each other.
-set(both limn_loaded_exr limn_loaded_meshes limn_loaded_mrcal limn_loaded_volumes)
+set(both limn_loaded_exr limn_loaded_markers limn_loaded_meshes limn_loaded_mrcal limn_loaded_volumes)
 install(TARGETS limn_room_dds limn_loaded_gige limn_loaded_printing limn_loaded_rays limn_loaded_video ${both}
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/limn COMPONENT program)
 install(TARGETS ${both} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/liblimn COMPONENT library)

@@ -133,18 +133,10 @@ CodeFamily empty_family(const std::string& name, int cells) {
   return family;
 }
 
-CodeFamily from_opencv(const std::string& name, int index) {
-  const cv::aruco::Dictionary dictionary = opencv_dictionary(index);
-  CodeFamily family = empty_family(name, dictionary.markerSize);
-  for (int id = 0; id < dictionary.bytesList.rows; ++id) {
-    const cv::Mat bits =
-        cv::aruco::Dictionary::getBitsFromByteList(dictionary.bytesList.rowRange(id, id + 1), family.cells);
-    std::uint64_t code = 0;
-    for (int row = 0; row < family.cells; ++row)
-      for (int column = 0; column < family.cells; ++column)
-        code = (code << 1) | std::uint64_t{bits.at<std::uint8_t>(row, column) != 0};
-    family.codes.push_back(four_turns(code, family.grid));
-  }
+Result<CodeFamily> from_opencv(const std::string& name, int number) {
+  LIMN_TRY(const OpencvDictionary dictionary, opencv_dictionary(number));
+  CodeFamily family = empty_family(name, dictionary.cells);
+  for (const std::uint64_t code : dictionary.codes) family.codes.push_back(four_turns(code, family.grid));
   family.max_errors = correctable_errors(family);
   return family;
 }

@@ -79,9 +79,10 @@ Status read_charuco_fields(const std::string& text, const std::vector<std::strin
   if (!find_predefined_family(board->dictionary))
     return error("board '{}': expected a dictionary such as aruco_4x4_50 or aruco_5x5_250, found '{}'.", text,
                  board->dictionary);
-  if (const int has = dictionary_of(*board).bytesList.rows; has < markers)
+  LIMN_TRY(const OpencvDictionary dictionary, dictionary_of(*board));
+  if (std::ssize(dictionary.codes) < markers)
     return error("board '{}': needs {} markers, but {} has {}. Use a larger dictionary.", text, markers,
-                 board->dictionary, has);
+                 board->dictionary, dictionary.codes.size());
   board->marker_share = 0.75;
   if (parts.size() > 4 && (!read_number(parts[4], &board->marker_share) || !(board->marker_share >= 0.4) ||
                            !(board->marker_share <= 0.9)))
@@ -102,8 +103,10 @@ Status read_aprilgrid_fields(const std::string& text, const std::string& gap, Bo
   board->columns = 2 * board->columns + 1;
   board->rows = 2 * board->rows + 1;
   board->dictionary = "apriltag_36h11";
-  if (const int has = dictionary_of(*board).bytesList.rows; has < tags)
-    return error("board '{}': needs {} tags, but {} has {}.", text, tags, board->dictionary, has);
+  LIMN_TRY(const OpencvDictionary dictionary, dictionary_of(*board));
+  if (std::ssize(dictionary.codes) < tags)
+    return error("board '{}': needs {} tags, but {} has {}.", text, tags, board->dictionary,
+                 dictionary.codes.size());
   return {};
 }
 
@@ -142,7 +145,7 @@ PixelGrid pixel_grid(const Board& board, int least) {
     while (square < 2 * least && !near_whole(square / board.square_m)) ++square;
     return {square < 2 * least ? square : least, 0};
   }
-  const int cells = dictionary_of(board).markerSize + 2;
+  const int cells = dictionary_of(board)->cells + 2;
   auto fits = [&](int square) {
     const double cell = square * board.marker_share / cells;
     return near_whole(cell) && (square - cells * std::lround(cell)) % 2 == 0;
@@ -169,11 +172,9 @@ std::optional<int> aprilgrid_tag(const Board& board, int column, int row) {
   return (board.rows / 2 - 1 - row / 2) * (board.columns / 2) + column / 2;
 }
 
-int aprilgrid_tag_cells(const Board& board) {
-  return dictionary_of(board).markerSize + 2 * k_aprilgrid_border;
-}
+int aprilgrid_tag_cells(const Board& board) { return dictionary_of(board)->cells + 2 * k_aprilgrid_border; }
 
-cv::aruco::Dictionary dictionary_of(const Board& board) {
+Result<OpencvDictionary> dictionary_of(const Board& board) {
   const PredefinedFamily* family = find_predefined_family(board.dictionary);
   LIMN_CHECK(family != nullptr);
   return opencv_dictionary(family->opencv_dictionary);
@@ -242,8 +243,8 @@ namespace {
 
 // Draws an AprilGrid's tag into its black square. OpenCV's table is turned by 180 degrees against AprilTag's.
 void draw_tag(const Board& board, int id, int cell_px, cv::Mat square) {
-  const cv::aruco::Dictionary dictionary = dictionary_of(board);
-  cv::Mat tag = opencv_marker_image(dictionary, id, (dictionary.markerSize + 2) * cell_px);
+  const OpencvDictionary dictionary = dictionary_of(board).value();
+  cv::Mat tag = opencv_marker_image(dictionary, id, (dictionary.cells + 2) * cell_px);
   cv::rotate(tag, tag, cv::ROTATE_180);
   const int border = (square.cols - tag.cols) / 2;
   tag.copyTo(square(cv::Rect(border, border, tag.cols, tag.rows)));
@@ -284,8 +285,8 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
     draw_circles(board, &sheet);
     return sheet;
   }
-  std::optional<cv::aruco::Dictionary> dictionary;
-  if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board);
+  std::optional<OpencvDictionary> dictionary;
+  if (board.kind == BoardKind::charuco) dictionary = dictionary_of(board).value();
   int id = 0;
   for (int row = 0; row < board.rows; ++row) {
     for (int column = 0; column < board.columns; ++column) {
@@ -295,7 +296,7 @@ BoardSheet draw_board(const Board& board, const DrawOptions& options) {
         square.setTo(0);
         if (const auto tag = aprilgrid_tag(board, column, row)) draw_tag(board, *tag, grid.cell, square);
       } else if (dictionary) {
-        const int side = grid.cell * (dictionary->markerSize + 2), gap = (grid.square - side) / 2;
+        const int side = grid.cell * (dictionary->cells + 2), gap = (grid.square - side) / 2;
         opencv_marker_image(*dictionary, id++, side).copyTo(square(cv::Rect(gap, gap, side, side)));
       }
     }

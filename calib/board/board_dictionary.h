@@ -7,9 +7,9 @@
 
 namespace limn::calib {
 
-/// OpenCV's table of a board's markers. For use in this folder only, because it needs OpenCV's
-/// headers.
-cv::aruco::Dictionary dictionary_of(const Board& board);
+/// The dictionary of a board's markers. Error: OpenCV's dictionaries cannot be loaded. Board::parse has made
+/// sure that they can be.
+Result<OpencvDictionary> dictionary_of(const Board& board);
 
 /// Width of the border of an AprilGrid's tags, in cells.
 constexpr int k_aprilgrid_border = 2;

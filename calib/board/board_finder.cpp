@@ -284,7 +284,7 @@ float line_of(const Board& board, int line) {
 }
 
 std::vector<DetectedMarker> find_markers(const Board& board, const cv::Mat& grey) {
-  const auto [quads, ids] = find_opencv_markers(grey, dictionary_of(board));
+  const auto [quads, ids] = find_opencv_markers(grey, dictionary_of(board).value());
   std::vector<std::pair<int, int>> squares;
   for (int row = 0; row < board.rows; ++row) {
     for (int column = 0; column < board.columns; ++column) {
@@ -327,13 +327,12 @@ std::vector<DetectedMarker> consistent(std::vector<DetectedMarker> markers) {
 // The corners of an AprilGrid's tags in pixels, by their ids, detected in images whose white is widened so
 // much that tags do not touch the squares at their corners.
 std::map<int, std::vector<cv::Point2f>> find_tags(const Board& board, const cv::Mat& grey) {
-  cv::aruco::DetectorParameters parameters;
-  parameters.markerBorderBits = k_aprilgrid_border;
+  const OpencvDictionary dictionary = dictionary_of(board).value();
   std::map<int, std::vector<cv::Point2f>> found;
   for (const int widened_px : {1, 3, 5, 9}) {
     cv::Mat apart;
     cv::dilate(grey, apart, cv::Mat::ones(widened_px, widened_px, CV_8U));
-    const auto [quads, ids] = find_opencv_markers(apart, dictionary_of(board), parameters);
+    const auto [quads, ids] = find_opencv_markers(apart, dictionary, k_aprilgrid_border);
     for (size_t i = 0; i < ids.size(); ++i) found.emplace(ids[i], quads[i]);
   }
   return found;

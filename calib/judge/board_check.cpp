@@ -26,8 +26,8 @@ struct Marker {
   cv::Point2f px;  // its centre
 };
 
-std::vector<Marker> markers_of(const cv::Mat& grey, int dictionary) {
-  const auto [quads, ids] = find_opencv_markers(grey, opencv_dictionary(dictionary));
+std::vector<Marker> markers_of(const cv::Mat& grey, const OpencvDictionary& dictionary) {
+  const auto [quads, ids] = find_opencv_markers(grey, dictionary);
   std::vector<Marker> markers;
   for (size_t i = 0; i < ids.size(); ++i)
     markers.push_back({ids[i], (quads[i][0] + quads[i][1] + quads[i][2] + quads[i][3]) / 4});
@@ -64,7 +64,9 @@ int explained(const std::vector<Marker>& markers, int columns, bool white_first,
 std::optional<DetectedBoard> identify_charuco(const cv::Mat& grey) {
   DetectedBoard best;
   for (const PredefinedFamily& family : predefined_families()) {
-    const std::vector<Marker> markers = markers_of(grey, family.opencv_dictionary);
+    const auto dictionary = opencv_dictionary(family.opencv_dictionary);
+    if (!dictionary) return std::nullopt;
+    const std::vector<Marker> markers = markers_of(grey, *dictionary);
     if (static_cast<int>(markers.size()) < k_least_markers) continue;
     for (int columns = 3; columns <= k_widest; ++columns) {
       for (const bool white_first : {false, true}) {

@@ -16,11 +16,12 @@
 #include <optional>
 #include <set>
 
-#include "calib/board/board_dictionary.h"
 #include "calib/board_print.h"
 #include "calib/capture.h"
 #include "calib/judge/assess.h"
 #include "calib/solve.h"
+#include "core/opencv_markers/opencv_aruco.h"
+#include "core/predefined_family.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"
 #include "tests/bench/car_bench.h"
@@ -209,11 +210,11 @@ struct View {
 // ChArUco corners as OpenCV finds them, then refined in the image, because its interpolation is half a pixel
 // off.
 std::map<int, cv::Point2f> opencv_corners(const calib::Board& board, const cv::Mat& white) {
-  const cv::aruco::Dictionary dictionary = calib::dictionary_of(board);
+  const auto dictionary = aruco_dictionary(find_predefined_family(board.dictionary)->opencv_dictionary);
   const auto charuco =
       opencv_charuco_board({board.columns, board.rows}, static_cast<float>(board.square_m),
                            static_cast<float>(board.square_m * board.marker_share), dictionary);
-  const auto [markers, ids] = find_opencv_markers(white, dictionary);
+  const auto [markers, ids] = find_aruco_markers(white, dictionary);
   std::vector<int> corner_ids;
   std::vector<cv::Point2f> corners;
   if (!ids.empty()) cv::aruco::interpolateCornersCharuco(markers, ids, white, charuco, corners, corner_ids);

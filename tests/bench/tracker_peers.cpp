@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "core/opencv_markers.h"
+#include "core/opencv_markers/opencv_aruco.h"
 #include "core/predefined_family.h"
 #include "tracker/detector.h"
 
@@ -93,8 +93,8 @@ Peer opencv_peer(std::span<const std::string> families) {
   return {"OpenCV", [names, parameters](const cv::Mat& grey, const Lens*) {
             std::vector<Found> found;
             for (const std::string& name : names) {
-              const auto [corners, ids] = find_opencv_markers(
-                  grey, opencv_dictionary(find_predefined_family(name)->opencv_dictionary), parameters);
+              const auto [corners, ids] = find_aruco_markers(
+                  grey, aruco_dictionary(find_predefined_family(name)->opencv_dictionary), parameters);
               for (std::size_t i = 0; i < ids.size(); ++i) {
                 Found f{{name, std::to_string(ids[i])}, {}, unstated()};
                 for (std::size_t k = 0; k < 4; ++k) f.corners_px[k] = {corners[i][k].x, corners[i][k].y};
