@@ -176,6 +176,7 @@ Status set_up(const LiveOptions& options, session::SessionSetup* setup) {
   setup->paint.prediction = options.prediction;
   setup->paint.marker_light = options.marker_light;
   setup->paint.refill = options.refill;
+  setup->paint.prepares_lines = !options.serve.empty() || setup->scene.pen;
   for (const std::string& name : options.stereo) {
     if (!find_named(setup->rig.projectors, name))
       return usage_error("--stereo: expected a projector of the rig ({}), found '{}'.",

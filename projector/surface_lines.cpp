@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <set>
@@ -173,6 +174,9 @@ void SurfaceLines::place(const scene::PosedScene& posed) {
     texels.push_back(texel(segment.d_normal, 0));
     texels.push_back(texel(segment.style.colour, 0));
   }
+  // Mesa's software driver compiles a program anew when the size of a buffer becomes, or is no longer, a
+  // power of two.
+  texels.resize(std::min(std::bit_ceil(texels.size()), most_texels()), Eigen::Vector4f::Zero());
   buffer_ = make_buffer(texels.data(), texels.size() * sizeof(Eigen::Vector4f));
   texels_ = make_texels(buffer_, GL_RGBA32F);
 }

@@ -3,7 +3,7 @@
 namespace limn::session {
 
 DrawOptions draw_options(const ComposeOptions& options) {
-  return {options.marker_light, options.stereo_mm, options.stereo_projectors};
+  return {options.marker_light, options.stereo_mm, options.stereo_projectors, options.prepares_lines};
 }
 
 // Perception has already predicted with the filter to captured_at; its tracks are reused.

@@ -25,7 +25,8 @@ struct ComposeOptions {
   double stereo_mm = 63;  ///< between the eyes of a person before a screen or projector in stereo
   /// Projectors whose images are drawn for each eye of the viewer, by name.
   std::vector<std::string> stereo_projectors = {};
-  bool refill = true;  ///< other projectors fill in light that a shadow blocks
+  bool refill = true;           ///< other projectors fill in light that a shadow blocks
+  bool prepares_lines = false;  ///< DrawOptions::prepares_lines; for sessions in which lines may be drawn
   /// The images that screens show are proportional to light; they are converted to sRGB for screens.
   bool is_linear_camera = false;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/core.hpp>
+#include <string>
 
 namespace limn::session {
 namespace {
@@ -60,6 +61,7 @@ FrameDrawer::FrameDrawer(const scene::Scene* scene,
       renderer_(std::move(renderer)),
       bodies_(scene::bodies(*scene)),
       constellations_(scene::constellations(*scene)),
+      to_prepare_(options.prepares_lines ? 2 : 0),
       has_infrared_(std::ranges::count(rig->cameras, Spectrum::infrared, &Imager::sees) > 0),
       arriving_(rig->projectors.size()) {}
 
@@ -68,11 +70,31 @@ EyeImages FrameDrawer::image(const FrameDescription& frame, std::size_t projecto
   apply_arriving_light(frame.arriving);
   use_deviation(frame.deviation);
   renderer_.set_quick_motion(frame.is_moving);
+  if (to_prepare_ > 0 && frame.posed.world_from_prototype && !frame.is_black) prepare_lines(frame, projector);
   const std::string& name = rig_->projectors[projector].name;
   if (std::ranges::count(options_.stereo_projectors, name) == 0)
     return {drawn(frame, projector, frame.viewer)};
   const auto both = limn::eyes(frame.viewer, 1e-3 * options_.stereo_mm);
   return {drawn(frame, projector, both[0]), drawn(frame, projector, both[1])};
+}
+
+// Draws lines that nobody sees, on sides of the prototype's triangles, and then half of them: a change of
+// lines alone uses further programs. Drivers compile a program when it has something to draw.
+void FrameDrawer::prepare_lines(const FrameDescription& frame, std::size_t projector) {
+  constexpr std::size_t k_lines = 32;
+  --to_prepare_;
+  const scene::Mesh& mesh = scene_->prototype->mesh;
+  scene::PosedScene with_lines = frame.posed;
+  for (std::size_t i = 0; i < k_lines; ++i) {
+    const auto& triangle = mesh.triangles[i * mesh.triangles.size() / k_lines];
+    scene::DrawnLine& line = with_lines.drawn.emplace_back();
+    line.name = "prepared " + std::to_string(i);
+    line.curve.points.resize(2);
+    for (std::size_t k = 0; k < 2; ++k) line.curve.points[k].p = mesh.positions[triangle[k]].cast<double>();
+  }
+  renderer_.projector_image(projector, with_lines, frame.viewer);
+  with_lines.drawn.resize(with_lines.drawn.size() - k_lines / 2);
+  renderer_.projector_image(projector, with_lines, frame.viewer);
 }
 
 void FrameDrawer::apply_arriving_light(const std::vector<cv::Mat>& maps) {

@@ -23,6 +23,9 @@ struct DrawOptions {
   double stereo_mm = 63;  ///< between the eyes of a person before a projector in stereo
   /// Projectors whose images are drawn for each eye of the viewer, by name.
   std::vector<std::string> stereo_projectors = {};
+  /// The programs for lines of light are compiled with the first images of the prototype. Otherwise the first
+  /// line waits for that: for seconds where no GPU draws.
+  bool prepares_lines = false;
 };
 
 /// Draws projector images from frame descriptions: a pure function of description, scene, rig and options. A
@@ -50,6 +53,7 @@ class FrameDrawer {
               const Rig* rig,
               const DrawOptions& options,
               projector::Renderer renderer);
+  void prepare_lines(const FrameDescription& frame, std::size_t projector);
   void apply_arriving_light(const std::vector<cv::Mat>& maps);
   cv::Mat drawn(const FrameDescription& frame, std::size_t projector, const Imager& eye);
   cv::Mat faded_image(const FrameDescription& frame, std::size_t projector, const Imager& eye);
@@ -62,6 +66,9 @@ class FrameDrawer {
   projector::Renderer renderer_;
   std::vector<Body> bodies_;
   std::vector<Constellation> constellations_;
+  // How many images have lines prepared; the second one, because drivers compile some programs anew when a
+  // bare prototype was drawn in between.
+  int to_prepare_ = 0;
   bool has_infrared_ = false;                               // whether a camera sees no projected light
   std::vector<cv::Mat> arriving_;                           // the maps that the renderer has
   std::shared_ptr<const scene::DeviationLayer> deviation_;  // the layer that it has; null: none

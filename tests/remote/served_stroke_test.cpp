@@ -52,6 +52,7 @@ class AServedStroke : public AServer {
     session::SessionSetup setup;
     setup.rig = world_.rig;
     setup.scene = *world_.scene;
+    setup.paint.prepares_lines = true;
     setup.scene.folder = folder_ / "project";
     fs::create_directories(setup.scene.folder);
     telemetry_.emplace(session::Telemetry::create({}).value());
@@ -212,14 +213,6 @@ TEST_F(AServedStroke, IsLitWhereItWasDrawnAndSoon) {
   const auto guest = this->guest(Role::work);
   const auto picture = sent_picture(guest.get());
   ASSERT_TRUE(picture);
-  // The first line of a session waits for its shader: another line, which goes again.
-  const Vector3d p_first = 1e3 * drawn.front(), p_next = 1e3 * drawn[10];
-  const std::string value = fmt::format("points {} {} {} {} {} {}", p_first.x(), p_first.y(), p_first.z(),
-                                        p_next.x(), p_next.y(), p_next.z());
-  ASSERT_TRUE(session_->edit({"draw_line", "first", value}, "test", at_).ok());
-  compose();
-  ASSERT_TRUE(session_->edit({"erase_line", "first", ""}, "test", at_).ok());
-  compose();
   std::vector<double> took_ms, begun_ms;
   for (int k = 0; k < k_messages; ++k) {
     const Vector3d& p_last = drawn[static_cast<std::size_t>((k + 1) * k_points_each - 1)];

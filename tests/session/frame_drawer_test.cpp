@@ -1,9 +1,11 @@
 #include "session/drawing/frame_drawer.h"
 
+#include <epoxy/gl.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "device/gl_context.h"
@@ -101,6 +103,49 @@ TEST_F(FrameDrawerTest, OthersGiveTheLightOfADarkProjector) {
   EXPECT_LT(light(one[1]), 0.6 * light(both[1]));
   const std::vector<cv::Mat> again = compose().eye_images();
   for (std::size_t p = 0; p < 2; ++p) EXPECT_NEAR(light(again[p]) / light(both[p]), 1, 0.02);
+}
+
+int linked = 0;  // programs, by counted_link()
+PFNGLLINKPROGRAMPROC link_program = nullptr;
+void counted_link(GLuint program) {
+  ++linked;
+  link_program(program);
+}
+
+// The number of programs that are linked for an image.
+int programs_linked(FrameDrawer* drawer, const FrameDescription& frame, cv::Mat* image) {
+  linked = 0;
+  link_program = std::exchange(epoxy_glLinkProgram, &counted_link);
+  *image = drawer->image(frame, 0).left.clone();
+  epoxy_glLinkProgram = link_program;
+  return linked;
+}
+
+TEST_F(FrameDrawerTest, LinksNothingForTheFirstLineWhenLinesWerePrepared) {
+  for (int i = 0; i < 8; ++i) compose();
+  const FrameDescription bare = composer_.description();
+  ASSERT_TRUE(bare.posed.world_from_prototype);
+  FrameDescription with_line = bare;
+  scene::DrawnLine line;
+  line.curve.points.resize(2);
+  const scene::Mesh& door = scene_.prototype->mesh;
+  for (std::size_t k = 0; k < 2; ++k)
+    line.curve.points[k].p = door.positions[door.triangles[door.triangles.size() / 2][k]].cast<double>();
+  with_line.posed.drawn.push_back(line);
+  cv::Mat images[2][2];  // without and with preparation; bare, and with the line
+  int count[2][2];
+  for (const bool prepares : {false, true}) {
+    ComposeOptions options;
+    options.prepares_lines = prepares;
+    FrameDrawer drawer = FrameDrawer::create(&scene_, &seen_by_, draw_options(options)).value();
+    count[prepares][0] = programs_linked(&drawer, bare, &images[prepares][0]);
+    count[prepares][1] = programs_linked(&drawer, with_line, &images[prepares][1]);
+  }
+  EXPECT_GT(count[false][1], 0);
+  EXPECT_GT(count[true][0], 0);
+  EXPECT_EQ(count[true][1], 0);
+  EXPECT_GT(apart(images[false][0], images[false][1]), 0);  // the line is lit
+  for (const int k : {0, 1}) EXPECT_EQ(apart(images[false][k], images[true][k]), 0) << k;
 }
 
 }  // namespace
