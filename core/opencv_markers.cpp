@@ -2,7 +2,6 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/opencv_markers/opencv_library.h"
 #include "core/program_library.h"
 
 namespace limn {

@@ -37,4 +37,10 @@ OpencvMarkers find_opencv_markers(const cv::Mat& grey,
                                   const OpencvDictionary& dictionary,
                                   int border_cells = 1);
 
+/// What the shared library gives to the program.
+struct OpencvFunctions {
+  OpencvDictionary (*dictionary)(int number);
+  OpencvMarkers (*find_markers)(const cv::Mat& grey, int number, int border_cells);
+};
+
 }  // namespace limn

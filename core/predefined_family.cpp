@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/names.h"
-#include "core/opencv_markers/opencv_aruco.h"
+#include "core/opencv_aruco.h"
 
 namespace limn {
 namespace {

@@ -1,6 +1,4 @@
-#include "core/opencv_markers/opencv_library.h"
-
-#include "core/opencv_markers/opencv_aruco.h"
+#include "core/opencv_aruco.h"
 #include "core/program_library.h"
 
 LIMN_LIBRARY_VERSION(LIMN_VERSION)

@@ -312,7 +312,7 @@ class Builder {
   // The index of a body's mesh; nullopt when it has no surfaces.
   std::optional<std::size_t> cut_body(const Body& body,
                                       const std::function<Colour(const TopoDS_Face&)>& colours) {
-    Triangulated cut = triangulated(body.shape, how_, colours);
+    Triangulated cut = triangulated(body.shape, how_, asked_.chord_mm, colours);
     const std::string name = shown(body.name);
     if (cut.lost_faces > 0)
       model_.warnings.push_back(fmt::format("'{}': {} faces are damaged and left out", name, cut.lost_faces));

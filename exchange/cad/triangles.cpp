@@ -20,6 +20,8 @@
 #include <opencascade/TopTools_IndexedMapOfShape.hxx>
 #include <opencascade/TopTools_ListOfShape.hxx>
 #include <opencascade/TopoDS.hxx>
+#include <optional>
+#include <utility>
 
 namespace limn::cad {
 namespace {
@@ -27,8 +29,8 @@ namespace {
 constexpr double k_metres = 1e-3;      // the document's shapes are in millimetres
 constexpr int k_most_samples = 20000;  // triangles of a shape on which the chord error is measured
 constexpr int k_most_tries = 4, k_most_coarser = 6;
-constexpr double k_seconds_a_face = 0.02;          // processor time; nearly all faces take far less
-constexpr double k_safety = 0.9, k_finest = 0.05;  // shares of the wanted chord error
+constexpr double k_seconds_a_face = 0.02;           // processor time; nearly all faces take far less
+constexpr double k_safety = 0.75, k_finest = 0.05;  // shares of the wanted chord error
 // Between the points at which it is measured a surface is a little farther from its triangles.
 constexpr double k_measured = 0.98;
 
@@ -88,22 +90,59 @@ bool cut_shape(const TopoDS_Shape& shape, double chord_mm, const Tessellation& h
 }
 
 // Large shapes, and surfaces on which a refinement comes no nearer, need too many triangles for a small chord
-// error: they are cut with a larger one. Whether that was so.
-bool cut_in_time(const TopoDS_Shape& shape, double chord_mm, const Tessellation& how) {
+// error: they are cut with a larger one, first with the one that is asked
+// for. Whether that was so.
+bool cut_in_time(const TopoDS_Shape& shape, double chord_mm, double asked_mm, const Tessellation& how) {
   constexpr double k_coarser = 8;
   if (cut_shape(shape, chord_mm, how)) return false;
-  for (int tried = 1; tried <= k_most_coarser; ++tried)
-    if (cut_shape(shape, chord_mm *= k_coarser, how)) break;
+  double coarse_mm = chord_mm < asked_mm ? asked_mm : k_coarser * chord_mm;
+  for (int tried = 1; tried <= k_most_coarser && !cut_shape(shape, coarse_mm, how); ++tried)
+    coarse_mm *= k_coarser;
   return true;
 }
 
 // ---- the chord error
+
+// Whether the surface does not move (1e-6 mm) when u or v runs through the face: at a sphere's pole, at the
+// tip of a cone. A node has any u or v there.
+struct Pole {
+  bool in_u = false, in_v = false;
+};
+Pole pole_at(const BRepAdaptor_Surface& surface, const gp_XY& uv, const gp_XY& range) {
+  constexpr double k_still_mm = 1e-6;
+  gp_Pnt p;
+  gp_Vec du, dv;
+  surface.D1(uv.X(), uv.Y(), p, du, dv);
+  return {du.Magnitude() * range.X() < k_still_mm, dv.Magnitude() * range.Y() < k_still_mm};
+}
+
+// Gives corners at poles the u or v of the other ones.
+void leave_poles(const BRepAdaptor_Surface& surface, const gp_XY& range, gp_XY (&uv)[3]) {
+  Pole poles[3];
+  for (int k = 0; k < 3; ++k) poles[k] = pole_at(surface, uv[k], range);
+  const auto leave = [&](bool Pole::*at_pole, int coordinate) {
+    double sum = 0;
+    int count = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (poles[k].*at_pole) continue;
+      sum += uv[k].Coord(coordinate);
+      ++count;
+    }
+    for (int k = 0; k < 3 && count > 0; ++k)
+      if (poles[k].*at_pole) uv[k].SetCoord(coordinate, sum / count);
+  };
+  leave(&Pole::in_u, 1);
+  leave(&Pole::in_v, 2);
+}
 
 // The largest distance of surface points from the triangles between whose corners they are, mm: at the
 // middles of triangles and of their sides. Every `step`th triangle is measured.
 double surface_error_mm(const Cut& cut, int step) {
   const BRepAdaptor_Surface surface(cut.face, Standard_False);
   if (surface.GetType() == GeomAbs_Plane || !cut.triangles->HasUVNodes()) return 0;
+  const bool may_have_poles = surface.GetType() != GeomAbs_Cylinder;
+  double u0 = 0, u1 = 0, v0 = 0, v1 = 0;
+  BRepTools::UVBounds(cut.face, u0, u1, v0, v1);
   double worst = 0;
   for (int t = 1; t <= cut.triangles->NbTriangles(); t += step) {
     const Poly_Triangle& triangle = cut.triangles->Triangle(t);
@@ -116,6 +155,7 @@ double surface_error_mm(const Cut& cut, int step) {
     }
     const Eigen::Vector3d d_normal = (p[1] - p[0]).cross(p[2] - p[0]);
     if (!(d_normal.norm() > 1e-12)) continue;
+    if (may_have_poles) leave_poles(surface, {u1 - u0, v1 - v0}, uv);
     const gp_XY middles[4] = {(uv[0] + uv[1] + uv[2]) / 3, (uv[0] + uv[1]) / 2, (uv[1] + uv[2]) / 2,
                               (uv[2] + uv[0]) / 2};
     for (const gp_XY& middle : middles) {
@@ -242,28 +282,62 @@ int count_open_edges(const TopoDS_Shape& shape) {
   return open;
 }
 
+// What the mesher made of a shape.
+struct Attempt {
+  std::vector<Cut> cuts;
+  int lost_faces = 0, coarse_faces = 0;
+  double worst_mm = 0;
+  bool is_better_than(const Attempt& other) const {
+    return std::pair(lost_faces, worst_mm) < std::pair(other.lost_faces, other.worst_mm);
+  }
+};
+
+Attempt attempt_of(const TopoDS_Shape& shape, double asked_mm) {
+  Attempt out;
+  out.cuts = cuts_of(shape, &out.lost_faces);
+  for (const double mm : chord_errors_mm(out.cuts)) {
+    out.worst_mm = std::max(out.worst_mm, mm);
+    if (mm > asked_mm) ++out.coarse_faces;
+  }
+  return out;
+}
+
+// Cuts the shape, finer and finer until no surface is too far from its triangles. The mesher fails on some
+// faces with one chord error and not with another one, so it gets a few tries for them, too, first with the
+// one that is asked for.
+Attempt best_attempt(const TopoDS_Shape& shape, double asked_mm, const Tessellation& how) {
+  constexpr int k_tries_for_lost = 3;
+  constexpr double k_fine_miss = 2.5;  // by this factor a finer chord error than asked for may be missed
+  std::optional<Attempt> best;
+  double chord_mm = how.chord_mm, most_mm = std::min(asked_mm, k_fine_miss * how.chord_mm);
+  for (int tried = 1; tried <= k_most_tries; ++tried) {
+    const bool is_coarse = cut_in_time(shape, chord_mm, asked_mm, how);
+    Attempt attempt = attempt_of(shape, asked_mm);
+    const double worst_mm = attempt.worst_mm;
+    if (!best || attempt.is_better_than(*best)) best = std::move(attempt);
+    const bool is_whole = best->lost_faces == 0;
+    if (is_coarse || (worst_mm <= k_measured * most_mm && (is_whole || tried == k_tries_for_lost))) break;
+    if (!is_whole && chord_mm < asked_mm && most_mm < asked_mm)
+      chord_mm = most_mm = asked_mm;
+    else
+      chord_mm = std::max(k_finest * most_mm, chord_mm * std::min(k_safety, k_safety * most_mm / worst_mm));
+  }
+  return *std::move(best);
+}
+
 }  // namespace
 
 Triangulated triangulated(const TopoDS_Shape& shape,
                           const Tessellation& how,
+                          double asked_mm,
                           const std::function<Colour(const TopoDS_Face&)>& colour_of) {
+  const Attempt best = best_attempt(shape, asked_mm, how);
   Triangulated out;
-  std::vector<Cut> cuts;
-  double chord_mm = how.chord_mm;
-  for (int tried = 1; tried <= k_most_tries; ++tried) {
-    const bool is_coarse = cut_in_time(shape, chord_mm, how);
-    cuts = cuts_of(shape, &out.lost_faces);
-    const std::vector<double> errors = chord_errors_mm(cuts);
-    const double worst_mm = errors.empty() ? 0 : *std::max_element(errors.begin(), errors.end());
-    out.mesh.chord_error_mm = worst_mm;
-    out.coarse_faces = static_cast<int>(
-        std::count_if(errors.begin(), errors.end(), [&](double mm) { return mm > how.chord_mm; }));
-    if (worst_mm <= k_measured * how.chord_mm || is_coarse) break;
-    chord_mm =
-        std::max(k_finest * how.chord_mm, chord_mm * std::min(k_safety, k_safety * how.chord_mm / worst_mm));
-  }
+  out.lost_faces = best.lost_faces;
+  out.coarse_faces = best.coarse_faces;
+  out.mesh.chord_error_mm = best.worst_mm;
   std::map<Colour, std::size_t> piece_of;
-  for (const Cut& cut : cuts) {
+  for (const Cut& cut : best.cuts) {
     const Colour colour = colour_of(cut.face);
     const auto [known, is_new] = piece_of.try_emplace(colour, out.mesh.pieces.size());
     if (is_new) out.mesh.pieces.push_back({.colour = colour});

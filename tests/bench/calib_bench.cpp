@@ -20,7 +20,7 @@
 #include "calib/capture.h"
 #include "calib/judge/assess.h"
 #include "calib/solve.h"
-#include "core/opencv_markers/opencv_aruco.h"
+#include "core/opencv_aruco.h"
 #include "core/predefined_family.h"
 #include "sim/sensor_model.h"
 #include "sim/trace.h"

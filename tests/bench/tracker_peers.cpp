@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "core/opencv_markers/opencv_aruco.h"
+#include "core/opencv_aruco.h"
 #include "core/predefined_family.h"
 #include "tracker/detector.h"
 

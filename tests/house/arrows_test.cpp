@@ -368,12 +368,11 @@ TEST(House, HeadersKeepSlowThirdPartiesOut) {
 // What differs between the versions of a library that Debian's releases have is in one header, through which
 // all other files use the library. No header of Limn's includes one of them.
 TEST(House, LibrariesOfSeveralVersionsAreIncludedByOneHeader) {
-  const std::map<std::string, fs::path> headers = {
-      {"mrcal/", "core/mrcal.h"},
-      {"opencv2/aruco", "core/opencv_markers/opencv_aruco.h"},
-      {"opencv2/objdetect", "core/opencv_markers/opencv_aruco.h"},
-      {"embree3/", "sim/embree/embree.h"},
-      {"embree4/", "sim/embree/embree.h"}};
+  const std::map<std::string, fs::path> headers = {{"mrcal/", "core/mrcal.h"},
+                                                   {"opencv2/aruco", "core/opencv_aruco.h"},
+                                                   {"opencv2/objdetect", "core/opencv_aruco.h"},
+                                                   {"embree3/", "sim/embree/embree.h"},
+                                                   {"embree4/", "sim/embree/embree.h"}};
   int found = 0;
   for (const Include& include : includes()) {
     const fs::path file = fs::relative(include.file, root());
