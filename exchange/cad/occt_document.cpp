@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <fstream>
 #include <map>
 #include <opencascade/APIHeaderSection_MakeHeader.hxx>
 #include <opencascade/IGESCAFControl_Reader.hxx>
@@ -275,6 +276,16 @@ class References {
   std::set<fs::path> known_;
 };
 
+// Also accepts a byte order mark of UTF-8, which STEP does not allow, but some programs write.
+bool is_parsed(STEPControl_Reader* reader, const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string mark(3, '\0');
+  file.read(mark.data(), std::ssize(mark));
+  const auto parsed = mark == "\xEF\xBB\xBF" ? reader->ReadStream(path.filename().c_str(), file)
+                                             : reader->ReadFile(fs::absolute(path).c_str());
+  return parsed == IFSelect_RetDone;
+}
+
 Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
   OcctDocument out{.document = new_document(), .format = "STEP", .sources = {source_of(path)}};
   STEPCAFControl_Reader reader;
@@ -284,8 +295,7 @@ Result<OcctDocument> read_step(const fs::path& path, ProgressLines* progress) {
   reader.SetMatMode(false);
   reader.SetViewMode(false);
   LIMN_TRY_STATUS(set_code_page(path, &out));
-  if (reader.ReadFile(fs::absolute(path).c_str()) != IFSelect_RetDone)
-    return damaged(path, "STEP", "one that cannot be parsed");
+  if (!is_parsed(&reader.ChangeReader(), path)) return damaged(path, "STEP", "one that cannot be parsed");
   const Handle(StepData_StepModel) model = reader.ChangeReader().StepModel();
   if (model.IsNull() || model->NbEntities() == 0) return damaged(path, "STEP", "no entities");
   out.schema = step_schema(model);

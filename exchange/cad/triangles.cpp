@@ -307,13 +307,14 @@ Attempt attempt_of(const TopoDS_Shape& shape, double asked_mm) {
 // one that is asked for.
 Attempt best_attempt(const TopoDS_Shape& shape, double asked_mm, const Tessellation& how) {
   constexpr int k_tries_for_lost = 3;
-  constexpr double k_fine_miss = 2.5;  // by this factor a finer chord error than asked for may be missed
+  constexpr int k_fine_tries = 2;  // for a finer chord error than is asked for
   std::optional<Attempt> best;
-  double chord_mm = how.chord_mm, most_mm = std::min(asked_mm, k_fine_miss * how.chord_mm);
+  double chord_mm = how.chord_mm, most_mm = std::min(asked_mm, how.chord_mm);
   for (int tried = 1; tried <= k_most_tries; ++tried) {
     const bool is_coarse = cut_in_time(shape, chord_mm, asked_mm, how);
     Attempt attempt = attempt_of(shape, asked_mm);
     const double worst_mm = attempt.worst_mm;
+    if (tried == k_fine_tries) most_mm = asked_mm;
     if (!best || attempt.is_better_than(*best)) best = std::move(attempt);
     const bool is_whole = best->lost_faces == 0;
     if (is_coarse || (worst_mm <= k_measured * most_mm && (is_whole || tried == k_tries_for_lost))) break;

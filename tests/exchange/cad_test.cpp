@@ -143,6 +143,25 @@ TEST_F(Cad, TheChordErrorHoldsOnCurvedSurfaces) {
   EXPECT_LE(worst_of(load(folder / "out.glb"), from_ring), 0.01_mm);
 }
 
+// At a tip the surface's parameters say nothing, so the error there must not be measured between them.
+TEST_F(Cad, ATipIsNotCutFinerThanTheRest) {
+  StepText step;
+  step.part("tip", {step.cone(5, 3)});
+  const json found = report(write("tip.step", step.file()), {"--chord-mm", "0.2"});
+  EXPECT_TRUE(found["warnings"].empty()) << found["warnings"];
+  EXPECT_LE(found["chord_error_mm"].get<double>(), 0.2);
+  EXPECT_GT(found["chord_error_mm"].get<double>(), 0.001);
+  EXPECT_LE(found["triangles"].get<int>(), 200);
+  EXPECT_EQ(found["solids"].size(), 1U);
+}
+
+TEST_F(Cad, AByteOrderMarkIsNoFault) {
+  StepText step;
+  step.part("box", {step.box({10, 20, 30})});
+  const json plain = report(write("box.step", step.file()));
+  EXPECT_EQ(report(write("box.step", "\xEF\xBB\xBF" + step.file()))["solids"], plain["solids"]);
+}
+
 TEST_F(Cad, AShapeThatTakesTooLongGetsALargerChordErrorThatIsStated) {
   StepText step;
   step.part("ball", {step.sphere(20)});

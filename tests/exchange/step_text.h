@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cmath>
 #include <map>
 #include <string>
 #include <utility>
@@ -10,11 +11,12 @@
 
 namespace limn::test {
 
-/// Writes STEP files as text, without the library that reads them: boxes, spheres, tori, colours, assemblies.
+/// Writes STEP files as text, without the library that reads them: boxes, spheres, tori, cones, colours,
+/// assemblies.
 class StepText {
  public:
   /// `unit` is "mm", "m", "inch" or "none".
-  explicit StepText(std::string unit = "mm", std::string schema = "AUTOMOTIVE_DESIGN")
+  explicit StepText(const std::string& unit = "mm", std::string schema = "AUTOMOTIVE_DESIGN")
       : schema_(std::move(schema)) {
     const int metre = add("(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT({},.METRE.))", unit == "m" ? "$" : ".MILLI.");
     length_ = metre;
@@ -58,6 +60,30 @@ class StepText {
   int torus(double major, double minor) {
     return round_solid(add("TOROIDAL_SURFACE('',#{},{:.9E},{:.9E})", frame({0, 0, 0}), major, minor),
                        {major + minor, 0, 0});
+  }
+
+  /// A solid cone: its base around the origin, its tip below it.
+  int cone(double radius, double height) {
+    const int rim = add("VERTEX_POINT('',#{})", point({radius, 0, 0}));
+    const int tip = add("VERTEX_POINT('',#{})", point({0, 0, -height}));
+    const int circle = add("CIRCLE('',#{},{:.9E})", frame({0, 0, 0}), radius);
+    const int around = add("EDGE_CURVE('',#{0},#{0},#{1},.T.)", rim, circle);
+    const int down = add("VECTOR('',#{},1.)", direction({-radius, 0, -height}));
+    const int line = add("LINE('',#{},#{})", point({radius, 0, 0}), down);
+    const int seam = add("EDGE_CURVE('',#{},#{},#{},.T.)", rim, tip, line);
+    const auto along = [&](int edge, const char* sense) {
+      return add("ORIENTED_EDGE('',*,*,#{},{})", edge, sense);
+    };
+    const auto face = [&](int loop, int surface) {
+      return add("ADVANCED_FACE('',(#{}),#{},.T.)", add("FACE_OUTER_BOUND('',#{},.T.)", loop), surface);
+    };
+    const int base_loop = add("EDGE_LOOP('',(#{}))", along(around, ".T."));
+    const int base = face(base_loop, add("PLANE('',#{})", frame({0, 0, 0})));
+    const int side_loop =
+        add("EDGE_LOOP('',(#{},#{},#{}))", along(around, ".F."), along(seam, ".T."), along(seam, ".F."));
+    const int side = face(side_loop, add("CONICAL_SURFACE('',#{},{:.9E},{:.9E})", frame({0, 0, 0}), radius,
+                                         std::atan2(radius, height)));
+    return add("MANIFOLD_SOLID_BREP('',#{})", add("CLOSED_SHELL('',(#{},#{}))", base, side));
   }
 
   struct Product {
