@@ -42,6 +42,9 @@ class PaceControl {
   bool add_frame(double busy_s);
   /// The index of the chosen effort.
   std::size_t chosen() const { return chosen_; }
+  /// Somebody has just changed something: the effort does not rise until there has been time to spare anew,
+  /// because images with another resolution come with a pause.
+  void delay_rise() { spare_s_ = 0; }
   /// Forgets the frames that count at present, for example after the session has stood still.
   void forget_frames();
 

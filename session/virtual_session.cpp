@@ -130,6 +130,10 @@ class EffortControl {
   // To be called before each frame. True: the images have another size from now on.
   bool keep() {
     const auto busy_s = pace_.keep(rig_);
+    if (const auto& edited = parts_.session.last_edit(); edited && edited->count != edits_) {
+      edits_ = edited->count;
+      control_.delay_rise();
+    }
     if (parts_.session.show_state().frozen) control_.forget_frames();
     const Effort before = effort();
     if (is_ended_ || !busy_s || !control_.add_frame(*busy_s)) return false;
@@ -181,6 +185,7 @@ class EffortControl {
   WallPace pace_;
   sim::VirtualRig* rig_;
   SessionParts parts_;
+  std::size_t edits_ = 0;  // the number of edits so far
   bool is_ended_ = false;  // after a change that failed
 };
 

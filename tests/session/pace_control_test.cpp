@@ -55,6 +55,22 @@ TEST(PaceControl, RisesStepByStepWhenThereIsTimeToSpare) {
   EXPECT_EQ(control.chosen(), 0U);
 }
 
+TEST(PaceControl, DoesNotRiseWhileSomebodyWorks) {
+  PaceControl control(k_costs, k_period_s, 2);
+  const auto fast = [](std::size_t) { return 0.2 * k_period_s; };
+  for (int second = 0; second < 30; ++second) {
+    EXPECT_EQ(played(30, fast, &control), 0);
+    control.delay_rise();
+  }
+  EXPECT_EQ(played(1000, fast, &control), 2);
+  for (int i = 0; i < 30; ++i) {  // it still falls
+    played(
+        1, [](std::size_t chosen) { return 1.5 * k_period_s * k_costs[chosen]; }, &control);
+    control.delay_rise();
+  }
+  EXPECT_GT(control.chosen(), 0U);
+}
+
 TEST(PaceControl, ChangesNothingWhileFramesAreJustInTime) {
   PaceControl control(k_costs, k_period_s, 2);
   EXPECT_EQ(played(
