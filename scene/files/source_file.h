@@ -11,7 +11,7 @@
 namespace limn::scene {
 
 /// Which limn-cad made a kept GLB: it grows whenever the same CAD file becomes another GLB.
-inline constexpr int k_cad_glb_format = 3;
+inline constexpr int k_cad_glb_format = 4;
 
 /// Error: the path is no regular file (after links): there is none, or it is a folder, a pipe or a device.
 inline Status check_regular_file(const std::filesystem::path& path) {
