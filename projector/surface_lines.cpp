@@ -174,9 +174,11 @@ void SurfaceLines::place(const scene::PosedScene& posed) {
     texels.push_back(texel(segment.d_normal, 0));
     texels.push_back(texel(segment.style.colour, 0));
   }
-  // Mesa's software driver compiles a program anew when the size of a buffer becomes, or is no longer, a
-  // power of two.
-  texels.resize(std::min(std::bit_ceil(texels.size()), most_texels()), Eigen::Vector4f::Zero());
+  // Mesa's software driver compiles programs anew when the size of a buffer becomes, or is no longer, a power
+  // of two, and when it reaches 64 KB.
+  constexpr std::size_t k_least_texels = 4096;
+  const std::size_t capacity = std::bit_ceil(std::max(texels.size(), k_least_texels));
+  texels.resize(std::max(texels.size(), std::min(capacity, most_texels())), Eigen::Vector4f::Zero());
   buffer_ = make_buffer(texels.data(), texels.size() * sizeof(Eigen::Vector4f));
   texels_ = make_texels(buffer_, GL_RGBA32F);
 }
