@@ -90,8 +90,7 @@ bool cut_shape(const TopoDS_Shape& shape, double chord_mm, const Tessellation& h
 }
 
 // Large shapes, and surfaces on which a refinement comes no nearer, need too many triangles for a small chord
-// error: they are cut with a larger one, first with the one that is asked
-// for. Whether that was so.
+// error: they are cut with a larger one, first with the one that is asked for. Whether that was so.
 bool cut_in_time(const TopoDS_Shape& shape, double chord_mm, double asked_mm, const Tessellation& how) {
   constexpr double k_coarser = 8;
   if (cut_shape(shape, chord_mm, how)) return false;

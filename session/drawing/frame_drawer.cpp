@@ -84,6 +84,7 @@ void FrameDrawer::prepare_lines(const FrameDescription& frame, std::size_t proje
   constexpr std::size_t k_lines = 32;
   --to_prepare_;
   const scene::Mesh& mesh = scene_->prototype->mesh;
+  if (mesh.triangles.empty()) return;
   scene::PosedScene with_lines = frame.posed;
   for (std::size_t i = 0; i < k_lines; ++i) {
     const auto& triangle = mesh.triangles[i * mesh.triangles.size() / k_lines];
