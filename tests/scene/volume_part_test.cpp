@@ -92,7 +92,7 @@ TEST(VolumePart, ItsBoxIsClosedAndFacesOutwards) {
 }
 
 TEST(VolumePart, FilesInASlotsFolderBecomeVariants) {
-  const fs::path folder = folder_with(scene_with({k_head})), slot = folder / "slots" / "head";
+  const fs::path folder = folder_with(scene_with(json::array({k_head}))), slot = folder / "slots" / "head";
   fs::create_directories(slot / "series");
   ASSERT_TRUE(write_file(slot / "dropped.nii", nifti()));
   for (int k = 0; k < 3; ++k) {
@@ -113,7 +113,7 @@ TEST(VolumePart, FilesInASlotsFolderBecomeVariants) {
 
 TEST(VolumePart, WrongEntriesAreNamed) {
   const auto problem = [](json variant) {
-    const auto scene = load_scene(folder_with(scene_with({std::move(variant)})));
+    const auto scene = load_scene(folder_with(scene_with(json::array({std::move(variant)}))));
     return scene ? std::string() : scene.message();
   };
   json variant = k_head;
@@ -146,7 +146,7 @@ TEST(VolumePart, AWindowIsReadFromText) {
 }
 
 TEST(VolumePart, ALookKeepsTheWindow) {
-  const auto scene = load_scene(folder_with(scene_with({k_head})));
+  const auto scene = load_scene(folder_with(scene_with(json::array({k_head}))));
   ASSERT_TRUE(scene) << scene.message();
   const PosedScene posed{{}, {{"head", "a", Pose{}}}};
   const auto done = [&](const ShowState& before, const Edit& edit) {
