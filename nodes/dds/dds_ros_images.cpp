@@ -124,8 +124,8 @@ RosPublishers DdsRosImages::publishers() {
       if (is_here && is_image) out.count += each.count;
       if (is_here && !is_image) out.other_type = type_for_people(each.type);
     }
-  const auto twice = std::ranges::unique(out.image_topics);
-  out.image_topics.erase(twice.begin(), twice.end());
+  out.image_topics.erase(std::unique(out.image_topics.begin(), out.image_topics.end()),
+                         out.image_topics.end());
   return out;
 }
 

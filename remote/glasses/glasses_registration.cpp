@@ -168,7 +168,7 @@ void GlassesRegistration::add_view(const MeasuredView& view) {
   marker_seen_s_ = camera.at_s;
   view_problem_.clear();
   if (!filter_) {
-    filter_.emplace();
+    filter_ = Filter();
     filter_->covariance.block<6, 6>(6, 6) = diagonal(options_.camera_rad, options_.camera_m);
     const Vector3d lens(options_.focal_share, options_.centre_share, options_.centre_share);
     filter_->covariance.bottomRightCorner<3, 3>() = lens.cwiseAbs2().asDiagonal();

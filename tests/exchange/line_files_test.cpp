@@ -186,8 +186,8 @@ TEST_F(LineFiles, ALookOrALineAloneIsWritten) {
   const fs::path from = scene_with("from", lines_out());
   for (const auto& [name, shift] : {std::pair("day", 0.0), std::pair("night", 5.0)}) {
     scene::Look look{.name = name, .parts = {}};
-    const auto at = [&](double x) {
-      return scene::SurfacePoint{1e-3 * Vector3d(x, shift, height_mm(x)), Vector3d::UnitZ()};
+    const auto at = [y = shift](double x) {
+      return scene::SurfacePoint{1e-3 * Vector3d(x, y, height_mm(x)), Vector3d::UnitZ()};
     };
     look.lines = std::vector<std::string>{"ring", "trim"};
     look.drawn = {{"trim", {}, {{at(0), at(2)}, false}}};
