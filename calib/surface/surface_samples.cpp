@@ -24,8 +24,17 @@ constexpr std::size_t k_most_divided = 4;
 // Cosine of the angle from which on a corner's normal is one of shading, which rounds an edge that is sharp.
 constexpr float k_shading = 0.866F;  // 30 degrees
 
+// Half the cross product of two sides: along the normal, as long as the area.
+Vector3d area_vector(const Vector3f& a, const Vector3f& b, const Vector3f& c) {
+  return (b - a).cast<double>().cross((c - a).cast<double>()) / 2;
+}
+
 double triangle_area(const Vector3f& a, const Vector3f& b, const Vector3f& c) {
-  return (b - a).cast<double>().cross((c - a).cast<double>()).norm() / 2;
+  return area_vector(a, b, c).norm();
+}
+
+Vector3d area_vector(const scene::ScanSurface& surface, const Corners& t) {
+  return area_vector(surface.positions[t[0]], surface.positions[t[1]], surface.positions[t[2]]);
 }
 
 // Gives triangles corners of their own, with the triangle's normal, where the mesh's normal is one of
@@ -204,9 +213,12 @@ SurfaceSamples merged_samples(const SurfaceSamples& fine, std::size_t most) {
     out.surface.normals.push_back(fine.surface.normals[i]);
   }
   for (std::size_t i = 0; i < cell_of_point.size(); ++i) out.areas_m2[cell_of_point[i]] += fine.areas_m2[i];
-  for (const auto& [i, j, k] : fine.surface.triangles) {
-    const Corners corners = {cell_of_point[i], cell_of_point[j], cell_of_point[k]};
-    if (corners[0] != corners[1] && corners[1] != corners[2] && corners[2] != corners[0])
+  for (const Corners& triangle : fine.surface.triangles) {
+    const Corners corners = {cell_of_point[triangle[0]], cell_of_point[triangle[1]],
+                             cell_of_point[triangle[2]]};
+    if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
+    // Merging folds the surface in places. What faces backwards there has two others above it.
+    if (area_vector(out.surface, corners).dot(area_vector(fine.surface, triangle)) > 0)
       out.surface.triangles.push_back(corners);
   }
   // Several small triangles may span the same three cells.

@@ -21,8 +21,8 @@ double area_of(const scene::Mesh& mesh);
 /// Divides the mesh's triangles until no edge is longer than `spacing_m`. When these are more than `most`
 /// points, `spacing_m` grows to what `most` points over the mesh's area allow, and points of one cell of that
 /// size that face the same way are merged to the one nearest to their middle. So the result's size does not
-/// depend on the number of triangles, and every point lies on the mesh. Triangles without an area are left
-/// out.
+/// depend on the number of triangles, and every point lies on the mesh. Triangles face as those of the mesh
+/// do; those without an area are left out.
 SurfaceSamples surface_samples(const scene::Mesh& mesh, double spacing_m, std::size_t most);
 
 }  // namespace limn::calib

@@ -304,6 +304,11 @@ TEST(SurfaceSamples, CoverTheMeshAndDependOnItsAreaOnly) {
     const scene::MeshBvh index(mesh);
     for (std::size_t i = 0; i < samples.surface.positions.size(); i += 97)
       EXPECT_TRUE(index.nearest(samples.surface.positions[i].cast<double>(), 1e-6)) << i;
+    for (const auto& [a, b, c] : samples.surface.triangles) {
+      const Eigen::Vector3f& p = samples.surface.positions[a];
+      const Eigen::Vector3f n = (samples.surface.positions[b] - p).cross(samples.surface.positions[c] - p);
+      EXPECT_GT(n.dot(samples.surface.normals[a]), 0) << p.transpose();
+    }
     if (columns > 200) continue;
     for (const auto& [a, b, c] : samples.surface.triangles)
       EXPECT_LE((samples.surface.positions[a] - samples.surface.positions[b]).norm(),
