@@ -63,6 +63,7 @@ class NodeScreensTest : public ::testing::Test {
  protected:
   void open(const device::DisplayConfig& config, std::chrono::milliseconds delay = 0ms) {
     SlowLink::images = 0;
+    display_.reset();  // its thread sends through the host
     host_ = std::make_unique<Room>(std::make_unique<SlowLink>(&room_, "host", delay));
     node_ = std::make_unique<Room>(std::make_unique<test::MemoryLink>(&room_, "left"));
     ASSERT_TRUE(host_->offer({.is_host = true, .version = std::string(version())}).ok());
