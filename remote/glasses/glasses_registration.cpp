@@ -238,43 +238,60 @@ void GlassesRegistration::predict_to(double at_s, const Pose& feed_from_eye, Fil
   filter->at_s = std::max(filter->at_s, at_s);
 }
 
-// Updates the filter by one pair. False: the pair lies outside of the gate, or has no pose; it is not used.
-bool GlassesRegistration::use_pair(const MeasuredMarker& marker, Filter* filter) const {
-  const auto eye = eye_at(marker.at_s - clock_offset_s_ - filter->delay_s);
-  return eye && use_pair(marker, *eye, filter);
-}
-
-bool GlassesRegistration::use_pair(const MeasuredMarker& marker, const Moving& eye, Filter* filter) const {
-  predict_to(marker.at_s, eye.pose, filter);
-  const Pose a = boxplus(marker.world_from_marker, -marker.by_lens * filter->lens);
-  const Pose &x = filter->marker_from_eye, &y = filter->world_from_feed;
+GlassesRegistration::PairEquations GlassesRegistration::equations_at(const Filter& state,
+                                                                     const MeasuredMarker& marker,
+                                                                     const Moving& eye) const {
+  const Pose a = boxplus(marker.world_from_marker, -marker.by_lens * state.lens);
+  const Pose &x = state.marker_from_eye, &y = state.world_from_feed;
   const Matrix3d ra = a.rotation_matrix(), ry = y.rotation_matrix();
-  Eigen::Matrix<double, 6, k_size> jacobian = Eigen::Matrix<double, 6, k_size>::Zero();
-  jacobian.topLeftCorner<6, 6>() = -Matrix6d::Identity();
-  jacobian.block<3, 3>(3, 0) = skew(y.rotation * eye.pose.translation);
-  jacobian.block<3, 3>(0, 6) = jacobian.block<3, 3>(3, 9) = ra;
-  jacobian.col(12) << ry * eye.speed.head<3>(), ry * eye.speed.tail<3>();
+  PairEquations out;
+  out.jacobian.setZero();
+  out.jacobian.topLeftCorner<6, 6>() = -Matrix6d::Identity();
+  out.jacobian.block<3, 3>(3, 0) = skew(y.rotation * eye.pose.translation);
+  out.jacobian.block<3, 3>(0, 6) = out.jacobian.block<3, 3>(3, 9) = ra;
+  out.jacobian.col(12) << ry * eye.speed.head<3>(), ry * eye.speed.tail<3>();
   Matrix6d by_marker = Matrix6d::Identity();
   by_marker.block<3, 3>(3, 0) = -skew(a.rotation * x.translation);
-  jacobian.rightCols<3>() = -by_marker * marker.by_lens;
-  const Vector6d residual = boxminus(a * x, y * eye.pose);
-  const Matrix6d innovation = jacobian * filter->covariance * jacobian.transpose() +
-                              by_marker * marker.covariance * by_marker.transpose() +
-                              diagonal(options_.odometry_rad, options_.odometry_m);
+  out.jacobian.rightCols<3>() = -by_marker * marker.by_lens;
+  out.residual = boxminus(a * x, y * eye.pose);
+  out.noise = by_marker * marker.covariance * by_marker.transpose() +
+              diagonal(options_.odometry_rad, options_.odometry_m);
+  return out;
+}
+
+// A Kalman filter's update of a step and of its covariance. False: the pair lies outside of the gate; it is
+// not used.
+bool GlassesRegistration::update(const PairEquations& pair, Step* step, Covariance* covariance) {
+  const Vector6d residual = pair.residual + pair.jacobian * *step;
+  const Matrix6d innovation = pair.jacobian * *covariance * pair.jacobian.transpose() + pair.noise;
   const Eigen::LLT<Matrix6d> factor(innovation);
   if (residual.dot(factor.solve(residual)) > k_gate) return false;
-  const Eigen::Matrix<double, k_size, 6> gain = factor.solve(jacobian * filter->covariance).transpose();
-  const Eigen::Matrix<double, k_size, 1> step = -gain * residual;
-  filter->world_from_feed = boxplus(y, step.head<6>());
-  filter->marker_from_eye = boxplus(x, step.segment<6>(6));
-  filter->delay_s += step[12];
-  filter->lens += step.tail<3>();
-  filter->covariance -= gain * innovation * gain.transpose();
-  filter->covariance = 0.5 * (filter->covariance + filter->covariance.transpose()).eval();
+  const Eigen::Matrix<double, k_size, 6> gain = factor.solve(pair.jacobian * *covariance).transpose();
+  *step -= gain * residual;
+  *covariance -= gain * innovation * gain.transpose();
+  *covariance = 0.5 * (*covariance + covariance->transpose()).eval();
   return true;
 }
 
-// The filter after all of the first pairs, from a prior that says next to nothing.
+void GlassesRegistration::move_by(const Step& step, Filter* filter) {
+  filter->world_from_feed = boxplus(filter->world_from_feed, step.head<6>());
+  filter->marker_from_eye = boxplus(filter->marker_from_eye, step.segment<6>(6));
+  filter->delay_s += step[12];
+  filter->lens += step.tail<3>();
+}
+
+// Updates the filter by one pair. False: the pair lies outside of the gate; it is not used.
+bool GlassesRegistration::use_pair(const MeasuredMarker& marker, const Moving& eye, Filter* filter) const {
+  predict_to(marker.at_s, eye.pose, filter);
+  Step step = Step::Zero();
+  if (!update(equations_at(*filter, marker, eye), &step, &filter->covariance)) return false;
+  move_by(step, filter);
+  return true;
+}
+
+// The filter after all of the first pairs, from a covariance that says next to nothing. The equations of all
+// pairs are those at the prior's state, which is near the truth: the few first ones determine the state
+// badly, and equations at what follows from them contradict the later ones.
 GlassesRegistration::Filter GlassesRegistration::filtered(const Filter& prior, int* rejected) const {
   Filter filter = prior;
   filter.covariance.setZero();
@@ -283,7 +300,13 @@ GlassesRegistration::Filter GlassesRegistration::filtered(const Filter& prior, i
   filter.covariance(12, 12) = k_start_delay_s * k_start_delay_s;
   filter.at_s = first_.front().at_s;
   *rejected = 0;
-  for (const MeasuredMarker& marker : first_) *rejected += !use_pair(marker, &filter);
+  Step step = Step::Zero();
+  for (const MeasuredMarker& marker : first_) {
+    const auto eye = eye_at(marker.at_s - clock_offset_s_ - filter.delay_s);
+    if (eye) predict_to(marker.at_s, eye->pose, &filter);
+    *rejected += !eye || !update(equations_at(filter, marker, *eye), &step, &filter.covariance);
+  }
+  move_by(step, &filter);
   return filter;
 }
 

@@ -138,9 +138,16 @@ class GlassesRegistration {
     Covariance covariance = Covariance::Zero();      // [world_from_feed; marker_from_eye; delay; lens]
     double at_s = 0;
   };
+  using Step = Eigen::Matrix<double, k_size, 1>;  // a change of the state, in the covariance's order
   struct Moving {
     Pose pose;
     Vector6d speed;  // boxplus's delta, per second
+  };
+  // What a pair says of a step from a state: residual + jacobian * step is noise of this covariance.
+  struct PairEquations {
+    Vector6d residual;
+    Eigen::Matrix<double, 6, k_size> jacobian;
+    Matrix6d noise;
   };
 
   void restart();
@@ -148,7 +155,9 @@ class GlassesRegistration {
   bool is_new_place(const MeasuredMarker& marker, const Pose& feed_from_eye) const;
   void start_filter(double now_s);
   Filter filtered(const Filter& prior, int* rejected) const;
-  bool use_pair(const MeasuredMarker& marker, Filter* filter) const;
+  PairEquations equations_at(const Filter& state, const MeasuredMarker& marker, const Moving& eye) const;
+  static bool update(const PairEquations& pair, Step* step, Covariance* covariance);
+  static void move_by(const Step& step, Filter* filter);
   bool use_pair(const MeasuredMarker& marker, const Moving& eye, Filter* filter) const;
   bool continue_with(const MeasuredMarker& marker, const Moving& eye);
   std::string unseen_advice() const;

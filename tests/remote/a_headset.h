@@ -139,7 +139,7 @@ class Headset {
   }
 
   std::mt19937_64 rng_;
-  double phases_[7];
+  double phases_[7] = {};
   Pose world_from_feed_, marker_from_eye_;
   Vector6d creep_;
   double clock_s_ = 0, delay_s_ = 0, at_s_ = 100;
