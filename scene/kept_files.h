@@ -10,9 +10,9 @@ namespace limn::scene {
 /// The file of the lines that people have drawn in sessions (scene/drawn_lines.h).
 constexpr const char* k_drawn_lines_file = "drawn.json";
 
-/// Where sessions keep what people make of a scene (looks/, pairings.json, drawn.json, comments.json): the scene's
-/// folder, or, if this user cannot write there, as in a scene that was installed with Limn, a folder of the
-/// user for this scene: ~/.local/share/limn/scenes/ and the scene's whole path (user_data_folder() in
+/// Where sessions keep what people make of a scene (looks/, pairings.json, drawn.json, comments.json): the
+/// scene's folder, or, if this user cannot write there, as in a scene that was installed with Limn, a folder
+/// of the user for this scene: ~/.local/share/limn/scenes/ and the scene's whole path (user_data_folder() in
 /// core/user_folder.h). Without a home it is the scene's folder, where writing fails with a message.
 std::filesystem::path kept_folder(const std::filesystem::path& scene_folder);
 

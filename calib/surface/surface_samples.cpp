@@ -203,8 +203,9 @@ std::vector<std::uint32_t> chosen_points(const scene::ScanSurface& surface,
 SurfaceSamples merged_samples(const SurfaceSamples& fine, std::size_t most) {
   constexpr double k_larger = 1.25;
   double cell = fine.spacing_m;
-  auto [cell_of_point, cells] = cells_of(fine.surface, cell);
-  while (cells > most) std::tie(cell_of_point, cells) = cells_of(fine.surface, cell *= k_larger);
+  auto numbered = cells_of(fine.surface, cell);
+  while (numbered.second > most) numbered = cells_of(fine.surface, cell *= k_larger);
+  const auto& [cell_of_point, cells] = numbered;
   SurfaceSamples out;
   out.spacing_m = cell;
   out.areas_m2.assign(cells, 0);

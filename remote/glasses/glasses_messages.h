@@ -18,7 +18,8 @@ std::string glasses_message(const GlassesRegistration& registration,
                             std::span<const std::string> markers);
 
 /// The message `glasses_parts`: where the prototype and the parts are in the world and what the section cuts
-/// of them, in at most some 100 bytes a part, and as many again for one that is cut. `number` is that of the scene; with another number the page fetches the meshes again.
+/// of them, in at most some 100 bytes a part, and as many again for one that is cut. `number` is that of the
+/// scene; with another number the page fetches the meshes again.
 std::string glasses_parts_message(const scene::PosedScene& posed, const scene::Scene& scene, int number);
 
 /// `/glasses/light.json`: where each projector is and the outline of its light, as tangents (x / z, y / z in

@@ -78,7 +78,7 @@ class LineFiles : public testing::Test {
 
   // A scene's folder, with a comment in its scene.json.
   fs::path scene_with(const std::string& name, const json& lines) const {
-    const fs::path at = folder / name;
+    fs::path at = folder / name;
     EXPECT_TRUE(make_folder(at));
     EXPECT_TRUE(write_file(at / "sheet.obj", sheet_obj()));
     EXPECT_TRUE(

@@ -40,7 +40,7 @@ json scene_with(json variants) {
 }
 
 fs::path folder_with(const json& scene) {
-  const fs::path folder = test::test_folder();
+  fs::path folder = test::test_folder();
   EXPECT_TRUE(write_file(folder / "head.nii", nifti()));
   EXPECT_TRUE(write_file(folder / "quad.obj", "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nf 1 2 3 4\n"));
   EXPECT_TRUE(write_file(folder / "scene.json", scene.dump(2)));

@@ -153,7 +153,7 @@ struct DicomFile {
     return out;
   }
   std::string functional_groups() const {
-    const auto texts = [&](std::vector<std::pair<std::array<int, 2>, std::string>> elements) {
+    const auto texts = [&](const std::vector<std::pair<std::array<int, 2>, std::string>>& elements) {
       std::string out;
       for (const auto& [tag, value] : elements)
         if (!value.empty()) add(&out, is_explicit, tag[0], tag[1], "DS", value);
