@@ -218,7 +218,8 @@ SurfaceSamples merged_samples(const SurfaceSamples& fine, std::size_t most) {
     const Corners corners = {cell_of_point[triangle[0]], cell_of_point[triangle[1]],
                              cell_of_point[triangle[2]]};
     if (corners[0] == corners[1] || corners[1] == corners[2] || corners[2] == corners[0]) continue;
-    // Merging folds the surface in places. What faces backwards there has two others above it.
+    // Merging turns some small triangles over. Nearly all of these have the corners of one that was not
+    // turned.
     if (area_vector(out.surface, corners).dot(area_vector(fine.surface, triangle)) > 0)
       out.surface.triangles.push_back(corners);
   }
